@@ -1,0 +1,125 @@
+//! Options that every subcommand has, and how results and progress are shown.
+
+use anyhow::{Context, bail};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use reprobe::progress::Progress;
+use reprobe::scene::load::LoadOptions;
+use reprobe::scene::{Scene, load};
+use std::path::Path;
+use std::sync::Mutex;
+
+/// Options of every subcommand.
+#[derive(clap::Args)]
+pub struct Common {
+    /// Worker threads [default: all cores]
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Seed of all random numbers
+    #[arg(long, global = true, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+    /// Where to compute: auto, cpu, gpu or gpu:NAME
+    #[arg(long, global = true, value_name = "DEVICE", default_value = "auto")]
+    pub device: String,
+    /// No progress bar and no summary
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Print one JSON object with the run's figures in place of the summary
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Say more
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
+    /// Multiplies all lengths of the scene, to make them metres
+    #[arg(long, global = true, value_name = "S", default_value_t = 1.0)]
+    pub unit_scale: f32,
+    /// Gives a scene parameter a value: NAME=VALUE for `$NAME`
+    #[arg(long = "define", short = 'D', global = true, value_name = "NAME=VALUE")]
+    pub defines: Vec<String>,
+}
+
+/// What a subcommand did.
+#[derive(Default)]
+pub struct Outcome {
+    /// For people.
+    pub summary: String,
+    /// For programs (`--json`).
+    pub figures: serde_json::Value,
+    /// A `--max-*` threshold was passed: exit code 1.
+    pub check_failed: bool,
+}
+
+impl Common {
+    /// Sets up the thread pool and checks the device.
+    pub fn start(&self) -> anyhow::Result<()> {
+        if let Some(n) = self.threads {
+            if n == 0 {
+                bail!("--threads 0: expected at least 1");
+            }
+            rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")?;
+        }
+        match self.device.as_str() {
+            "auto" | "cpu" => Ok(()),
+            d if d == "gpu" || d.starts_with("gpu:") => bail!("--device {d}: this build has no GPU backend; use --device cpu"),
+            d => bail!("--device {d}: expected auto, cpu, gpu or gpu:NAME"),
+        }
+    }
+
+    /// Loads a scene and prints its warnings.
+    pub fn load_scene(&self, path: &Path) -> anyhow::Result<Scene> {
+        if !(self.unit_scale.is_finite() && self.unit_scale > 0.0) {
+            bail!("--unit-scale {}: expected a positive number", self.unit_scale);
+        }
+        let mut options = LoadOptions { unit_scale: self.unit_scale, ..LoadOptions::default() };
+        for d in &self.defines {
+            let (name, value) = d.split_once('=').with_context(|| format!("--define {d}: expected NAME=VALUE"))?;
+            options.defines.push((name.into(), value.into()));
+        }
+        let scene = load(path, &options)?;
+        for w in &scene.warnings {
+            eprintln!("reprobe: warning: {w}");
+        }
+        Ok(scene)
+    }
+
+    /// Prints a result to stdout.
+    pub fn report(&self, outcome: &Outcome) {
+        if self.json {
+            println!("{}", outcome.figures);
+        } else if !self.quiet && !outcome.summary.is_empty() {
+            println!("{}", outcome.summary.trim_end());
+        }
+    }
+
+    /// A progress bar on stderr, drawn only on a terminal.
+    pub fn progress(&self) -> Bar {
+        Bar { hidden: self.quiet, bar: Mutex::new(None) }
+    }
+}
+
+/// Shows a stage's progress with the time left.
+pub struct Bar {
+    hidden: bool,
+    bar: Mutex<Option<ProgressBar>>,
+}
+
+impl Progress for Bar {
+    fn start(&self, what: &str, total: u64) {
+        let target = if self.hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let style = ProgressStyle::with_template("{msg:24} {wide_bar} {percent:>3} %  {elapsed} gone, {eta} left")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = ProgressBar::with_draw_target(Some(total), target).with_style(style).with_message(what.to_owned());
+        *self.bar.lock().unwrap_or_else(|e| e.into_inner()) = Some(bar);
+    }
+
+    fn advance(&self, n: u64) {
+        if let Some(bar) = &*self.bar.lock().unwrap_or_else(|e| e.into_inner()) {
+            bar.inc(n);
+        }
+    }
+
+    fn finish(&self) {
+        if let Some(bar) = self.bar.lock().unwrap_or_else(|e| e.into_inner()).take() {
+            bar.finish_and_clear();
+        }
+    }
+}

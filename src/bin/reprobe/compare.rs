@@ -1,0 +1,11 @@
+//! `reprobe compare`.
+
+use crate::common::{Common, Outcome};
+
+/// Not yet
+#[derive(clap::Args)]
+pub struct Args {}
+
+pub fn run(_args: &Args, _common: &Common) -> anyhow::Result<Outcome> {
+    anyhow::bail!("not yet")
+}

@@ -1,0 +1,239 @@
+//! EXR images of named channels, with provenance.
+
+use super::{Provenance, atomic};
+use crate::{Error, Result};
+use exr::prelude as e;
+use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
+use half::f16;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Most pixels that an image may have: untrusted files do not get to allocate more.
+const MAX_PIXELS: usize = 1 << 28;
+
+/// Samples of one channel, rows from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Samples {
+    /// Half floats.
+    F16(Vec<f16>),
+    /// Floats.
+    F32(Vec<f32>),
+    /// Unsigned integers.
+    U32(Vec<u32>),
+}
+
+/// An image of named channels (`glossy.R`, `m_size`, ...), all of one size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExrImage {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Channels by full name.
+    pub channels: Vec<(String, Samples)>,
+    /// Where the image came from.
+    pub provenance: Option<Provenance>,
+}
+
+impl ExrImage {
+    /// An image without channels.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self { width, height, channels: Vec::new(), provenance: None }
+    }
+
+    /// Adds a channel of floats.
+    pub fn with_f32(mut self, name: &str, values: Vec<f32>) -> Self {
+        self.channels.push((name.into(), Samples::F32(values)));
+        self
+    }
+
+    /// Adds a channel of floats, stored as halves (clamped to their range).
+    pub fn with_f16(mut self, name: &str, values: impl IntoIterator<Item = f32>) -> Self {
+        let max = f16::MAX.to_f32();
+        let values = values.into_iter().map(|v| f16::from_f32(v.clamp(-max, max))).collect();
+        self.channels.push((name.into(), Samples::F16(values)));
+        self
+    }
+
+    /// Adds a channel of integers.
+    pub fn with_u32(mut self, name: &str, values: Vec<u32>) -> Self {
+        self.channels.push((name.into(), Samples::U32(values)));
+        self
+    }
+
+    /// Adds `layer.R`, `layer.G`, `layer.B` (or plain `R`, `G`, `B` for an empty layer name).
+    pub fn with_rgb(mut self, layer: &str, pixels: &[crate::math::Rgb]) -> Self {
+        for (i, c) in ["R", "G", "B"].into_iter().enumerate() {
+            let name = if layer.is_empty() { c.into() } else { format!("{layer}.{c}") };
+            self.channels.push((name, Samples::F32(pixels.iter().map(|p| p[i]).collect())));
+        }
+        self
+    }
+
+    /// Sets the provenance.
+    pub fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.provenance = Some(provenance);
+        self
+    }
+
+    fn names(&self) -> String {
+        self.channels.iter().map(|(n, _)| n.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    fn channel(&self, path: &Path, name: &str) -> Result<&Samples> {
+        self.channels
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, s)| s)
+            .ok_or_else(|| Error::input(path, format!("channel \"{name}\" is missing (found {})", self.names())))
+    }
+
+    /// A channel as floats, whatever it is stored as. `path` is for the message.
+    pub fn f32(&self, path: &Path, name: &str) -> Result<Vec<f32>> {
+        Ok(match self.channel(path, name)? {
+            Samples::F16(v) => v.iter().map(|x| x.to_f32()).collect(),
+            Samples::F32(v) => v.clone(),
+            Samples::U32(v) => v.iter().map(|&x| x as f32).collect(),
+        })
+    }
+
+    /// A channel of integers.
+    pub fn u32(&self, path: &Path, name: &str) -> Result<Vec<u32>> {
+        match self.channel(path, name)? {
+            Samples::U32(v) => Ok(v.clone()),
+            _ => Err(Error::input(path, format!("channel \"{name}\" should hold unsigned integers"))),
+        }
+    }
+
+    /// Three channels `layer.R`, `layer.G`, `layer.B` (plain `R`, `G`, `B` for an empty layer name) as colours.
+    pub fn rgb(&self, path: &Path, layer: &str) -> Result<Vec<crate::math::Rgb>> {
+        let get = |c: &str| self.f32(path, &if layer.is_empty() { c.into() } else { format!("{layer}.{c}") });
+        let (r, g, b) = (get("R")?, get("G")?, get("B")?);
+        Ok(r.into_iter().zip(g).zip(b).map(|((r, g), b)| crate::math::Rgb::new(r, g, b)).collect())
+    }
+
+    /// The provenance, or an error that says that there is none.
+    pub fn provenance(&self, path: &Path) -> Result<&Provenance> {
+        self.provenance.as_ref().ok_or_else(|| Error::input(path, "has no provenance attribute: not written by reprobe"))
+    }
+
+    /// Writes the file in one step.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        atomic::write(path, &self.to_bytes(path)?)
+    }
+
+    fn to_bytes(&self, path: &Path) -> Result<Vec<u8>> {
+        let mut list: Vec<_> = self.channels.iter().collect();
+        list.sort_by(|a, b| a.0.cmp(&b.0));
+        let channels = list
+            .into_iter()
+            .map(|(name, samples)| {
+                let flat = match samples {
+                    Samples::F16(v) => e::FlatSamples::F16(v.clone()),
+                    Samples::F32(v) => e::FlatSamples::F32(v.clone()),
+                    Samples::U32(v) => e::FlatSamples::U32(v.clone()),
+                };
+                e::AnyChannel::new(name.as_str(), flat)
+            })
+            .collect();
+        let mut attributes = e::LayerAttributes::default();
+        if let Some(p) = &self.provenance {
+            // One attribute only: the crate keeps them in a hash map, whose order would differ from run to run.
+            let text = serde_json::to_string(p).map_err(|err| Error::input(path, err.to_string()))?;
+            attributes.other.insert("provenance".into(), e::AttributeValue::Text(text.as_str().into()));
+        }
+        let encoding = e::Encoding {
+            compression: e::Compression::ZIP16,
+            blocks: e::Blocks::ScanLines,
+            line_order: e::LineOrder::Increasing,
+        };
+        let layer = e::Layer::new((self.width, self.height), attributes, encoding, e::AnyChannels::sort(channels));
+        let mut bytes = Cursor::new(Vec::new());
+        e::Image::from_layer(layer)
+            .write()
+            .to_buffered(&mut bytes)
+            .map_err(|err| Error::input(path, format!("cannot be encoded: {err}")))?;
+        Ok(bytes.into_inner())
+    }
+
+    /// Reads a file written by [`ExrImage::write`], or any flat EXR file.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|err| Error::io(path, err))?;
+        Self::from_bytes(path, &bytes)
+    }
+
+    fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let bad = |err: exr::error::Error| Error::input(path, format!("not a readable EXR file: {err}"));
+        let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(bad)?;
+        for header in &meta.headers {
+            let size = header.layer_size;
+            if size.0.saturating_mul(size.1) > MAX_PIXELS {
+                return Err(Error::input(path, format!("{} x {} pixels are more than the {MAX_PIXELS} allowed", size.0, size.1)));
+            }
+        }
+        let image = e::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(Cursor::new(bytes))
+            .map_err(bad)?;
+        let layer = image.layer_data;
+        let provenance = match layer.attributes.other.get(&e::Text::from("provenance")) {
+            Some(e::AttributeValue::Text(t)) => Some(
+                serde_json::from_str(&t.to_string())
+                    .map_err(|err| Error::input(path, format!("attribute \"provenance\": {err}")))?,
+            ),
+            _ => None,
+        };
+        let channels = layer
+            .channel_data
+            .list
+            .into_iter()
+            .map(|c| {
+                let samples = match c.sample_data {
+                    e::FlatSamples::F16(v) => Samples::F16(v),
+                    e::FlatSamples::F32(v) => Samples::F32(v),
+                    e::FlatSamples::U32(v) => Samples::U32(v),
+                };
+                (c.name.to_string(), samples)
+            })
+            .collect();
+        Ok(Self { width: layer.size.0, height: layer.size.1, channels, provenance })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_and_provenance_round_trip() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        let image = ExrImage::new(3, 2)
+            .with_f32("a.X", (0..6).map(|i| i as f32 * 0.1).collect())
+            .with_u32("b", (0..6).map(|i| u32::MAX - i).collect())
+            .with_f16("c", (0..6).map(|i| i as f32))
+            .with_provenance(Provenance::new("test", "abc", 7, &serde_json::json!({"x": 1})));
+        image.write(&path).unwrap();
+        let back = ExrImage::read(&path).unwrap();
+        assert_eq!(back, image);
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file stays behind");
+    }
+
+    #[test]
+    fn a_truncated_or_foreign_file_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        ExrImage::new(8, 8).with_f32("a", vec![1.0; 64]).write(&path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        for cut in [0, 3, 20, bytes.len() / 2, bytes.len() - 1] {
+            assert!(ExrImage::from_bytes(&path, &bytes[..cut]).is_err(), "cut at {cut}");
+        }
+        assert!(ExrImage::from_bytes(&path, b"not an image at all").is_err());
+        let message = ExrImage::read(&path).unwrap().f32(&path, "b").unwrap_err().to_string();
+        assert!(message.contains("\"b\" is missing (found a)"), "{message}");
+    }
+}

@@ -1,0 +1,8 @@
+//! Files: EXR layers, atomic writes, provenance.
+
+pub mod atomic;
+pub mod exr;
+pub mod provenance;
+
+pub use exr::{ExrImage, Samples};
+pub use provenance::Provenance;

@@ -1,0 +1,15 @@
+//! TODO
+/// See the module.
+pub mod composite;
+/// See the module.
+pub mod filter;
+/// See the module.
+pub mod footprint;
+/// See the module.
+pub mod gather;
+/// See the module.
+pub mod gbuffer;
+/// See the module.
+pub mod mirror;
+/// See the module.
+pub mod perturb;

@@ -1,0 +1,62 @@
+//! Triangles of all shapes in one set of arrays.
+
+use glam::{Vec2, Vec3};
+
+/// World-space triangles of all objects. Vertices are not shared between objects.
+#[derive(Debug, Default, Clone)]
+pub struct Geometry {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals, one a vertex; for objects with face normals they are unused.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, one a vertex; zero where the file has none.
+    pub uvs: Vec<Vec2>,
+    /// Vertex indices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// The object that each triangle belongs to.
+    pub triangle_object: Vec<u32>,
+    /// The objects, one a shape, in file order.
+    pub objects: Vec<Object>,
+}
+
+/// One shape of the scene file.
+#[derive(Debug, Clone)]
+pub struct Object {
+    /// The shape's id, or its file's stem.
+    pub name: String,
+    /// Its triangles in [`Geometry::triangles`].
+    pub triangles: std::ops::Range<u32>,
+    /// Its vertices in [`Geometry::positions`].
+    pub vertices: std::ops::Range<u32>,
+    /// Index into `Scene::materials`.
+    pub material: u32,
+    /// Index into `Scene::emitters`.
+    pub emitter: Option<u32>,
+    /// Shade with the geometric normal (`faceNormals`, or a file without normals).
+    pub face_normals: bool,
+    /// Whether the file gave texture coordinates.
+    pub has_uvs: bool,
+}
+
+impl Geometry {
+    /// Corners of a triangle.
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// The object of a triangle.
+    pub fn object(&self, triangle: u32) -> &Object {
+        &self.objects[self.triangle_object[triangle as usize] as usize]
+    }
+
+    /// Geometric normal times twice the area. `flipNormals` is already in the winding.
+    pub fn area_normal(&self, triangle: u32) -> Vec3 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a)
+    }
+
+    /// Lower and upper corner of everything; (inf, -inf) for an empty scene.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)))
+    }
+}

@@ -1,0 +1,41 @@
+//! A scene as the stages see it: world-space triangles, materials, textures, emitters and the sensor.
+//!
+//! [`load`] reads Mitsuba XML (0.5 to 3) or the JSON form of the same tree.
+
+pub mod camera;
+pub mod emitter;
+pub mod geometry;
+pub mod load;
+pub mod material;
+pub mod path;
+pub mod shapes;
+pub mod texture;
+pub mod tree;
+
+use std::path::PathBuf;
+
+pub use camera::Camera;
+pub use emitter::Emitter;
+pub use geometry::{Geometry, Object};
+pub use load::load;
+pub use material::Material;
+pub use texture::Texture;
+
+/// A loaded scene. Everything is in world space and scene units times `--unit-scale`.
+#[derive(Debug, Default)]
+pub struct Scene {
+    /// All triangles of all shapes.
+    pub geometry: Geometry,
+    /// Materials; `Object::material` indexes them.
+    pub materials: Vec<Material>,
+    /// Emitters; `Object::emitter` indexes the area lights among them.
+    pub emitters: Vec<Emitter>,
+    /// The scene file's own sensor.
+    pub sensor: Option<Camera>,
+    /// blake3 of the tree and of every file that it names, in hex: what provenance compares.
+    pub hash: String,
+    /// The file that was loaded.
+    pub path: PathBuf,
+    /// What was odd but no error: unknown properties, say. One line each, with file and line.
+    pub warnings: Vec<String>,
+}

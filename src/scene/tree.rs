@@ -1,0 +1,1 @@
+//! The plugin tree that XML and JSON both parse into.

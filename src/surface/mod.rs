@@ -1,0 +1,7 @@
+//! TODO
+/// See the module.
+pub mod curvature;
+/// See the module.
+pub mod paraboloid;
+/// See the module.
+pub mod tessellate;

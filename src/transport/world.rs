@@ -1,0 +1,51 @@
+//! A scene made ready for rays.
+
+use super::bvh::Bvh;
+use super::lights::Lights;
+use super::{Hit, Ray, Surface};
+use crate::scene::Scene;
+
+/// Scene, BVH and emitter distributions: what every ray-tracing stage takes.
+pub struct World {
+    /// The scene.
+    pub scene: Scene,
+    /// Its acceleration structure.
+    pub bvh: Bvh,
+    /// Its emitters, ready for sampling.
+    pub lights: Lights,
+}
+
+impl World {
+    /// All shapes, transmissive ones too: for `path-trace`.
+    pub fn new(scene: Scene) -> Self {
+        Self::with_filter(scene, |_, _| true)
+    }
+
+    /// Opaque shapes only: for the probe stages. Also says how many shapes were left out.
+    pub fn opaque(scene: Scene) -> (Self, usize) {
+        let transmissive: Vec<bool> = scene.materials.iter().map(|m| m.bsdf.is_transmissive()).collect();
+        let left_out = scene.geometry.objects.iter().filter(|o| transmissive[o.material as usize]).count();
+        (Self::with_filter(scene, |s, t| !transmissive[s.geometry.object(t).material as usize]), left_out)
+    }
+
+    fn with_filter(scene: Scene, keep: impl Fn(&Scene, u32) -> bool) -> Self {
+        let bvh = Bvh::build(&scene, &|t| keep(&scene, t));
+        let lights = Lights::new(&scene);
+        Self { scene, bvh, lights }
+    }
+
+    /// First hit of a ray.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.bvh.closest(&self.scene, ray)
+    }
+
+    /// First surface along a ray.
+    pub fn intersect(&self, ray: &Ray) -> Option<Surface> {
+        self.closest(ray).map(|hit| Surface::new(&self.scene, &hit))
+    }
+
+    /// Whether something blocks a ray.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.bvh.occluded(&self.scene, ray)
+    }
+}
