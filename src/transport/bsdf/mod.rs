@@ -3,6 +3,26 @@
 //! Semantics follow Mitsuba 3: `eval` includes the cosine of `wo`, `wi` is the viewer's side of the path tracer,
 //! one-sided models are black from behind, `twosided` mirrors them.
 
+pub mod adapters;
+pub mod conductor;
+pub mod dielectric;
+pub mod diffuse;
+pub mod microfacet;
+pub mod plastic;
+pub mod principled;
+pub mod roughdielectric;
+pub mod roughplastic;
+
+pub use adapters::{Blend, BumpMap, NormalMap, TwoSided};
+pub use conductor::{Conductor, RoughConductor};
+pub use dielectric::{Dielectric, DielectricParams, ThinDielectric};
+pub use diffuse::Diffuse;
+pub use microfacet::Distribution;
+pub use plastic::{Plastic, PlasticParams};
+pub use principled::{Principled, PrincipledParams};
+pub use roughdielectric::RoughDielectric;
+pub use roughplastic::RoughPlastic;
+
 use super::Surface;
 use crate::math::Rgb;
 use glam::{Vec2, Vec3};
@@ -52,7 +72,34 @@ pub struct BsdfSample {
 
 /// A scattering model with its parameters.
 #[derive(Debug, Clone)]
-pub enum Bsdf {}
+pub enum Bsdf {
+    /// Lambertian.
+    Diffuse(Diffuse),
+    /// Smooth coating over a diffuse base.
+    Plastic(Box<Plastic>),
+    /// Rough coating over a diffuse base.
+    RoughPlastic(Box<RoughPlastic>),
+    /// Smooth metal or perfect mirror.
+    Conductor(Conductor),
+    /// Rough metal.
+    RoughConductor(Box<RoughConductor>),
+    /// Smooth interface.
+    Dielectric(Box<Dielectric>),
+    /// Thin sheet.
+    ThinDielectric(Box<ThinDielectric>),
+    /// Rough interface.
+    RoughDielectric(Box<RoughDielectric>),
+    /// A model for each side.
+    TwoSided(TwoSided),
+    /// Frame tilted by a height field.
+    BumpMap(BumpMap),
+    /// Frame tilted by stored normals.
+    NormalMap(NormalMap),
+    /// Linear mix.
+    Blend(Blend),
+    /// Burley's principled model.
+    Principled(Box<Principled>),
+}
 
 impl Bsdf {
     /// f(wi, wo) · |cos wo|, without delta lobes.
