@@ -2,6 +2,7 @@
 
 pub mod bsdf;
 pub mod bvh;
+pub mod envmap;
 pub mod lights;
 pub mod path;
 pub mod sampler;

@@ -1,11 +1,25 @@
 //! The path tracer, with the split of the first vertex into its diffuse and non-diffuse lobes.
+//!
+//! At each vertex one emitter sample and one BSDF sample, combined by the power heuristic (Veach 1997, §9.2), as Mitsuba's
+//! `path`. Ours: the two halves of the first vertex are two paths of their own that share the camera ray, so one pass gives all
+//! layers, each with the noise of a render of that layer alone; and the roulette's throughput leaves the first vertex's
+//! weight out, so that a weak lobe's layer is as well sampled as a strong one's.
 
-use super::bsdf::{Lobes, Query};
+use super::bsdf::{Bsdf, BsdfSample, Lobes, Query};
+use super::lights::LightSample;
 use super::{Ray, Sampler, Surface, World};
 use crate::math::Rgb;
+use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Largest probability with which the roulette lets a path live (Mitsuba's).
+const ROULETTE_CAP: f32 = 0.95;
 
 /// Depth and termination.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PathParams {
     /// Most scattering vertices a path may have; `u32::MAX` is unbounded.
     pub max_depth: u32,
@@ -30,34 +44,236 @@ pub struct Layers {
     pub glossy: Rgb,
 }
 
+impl Layers {
+    /// The full image.
+    pub fn sum(&self) -> Rgb {
+        self.emission + self.diffuse + self.glossy
+    }
+}
+
 /// One sample of the three layers along a camera ray.
-pub fn trace_layers(_world: &World, _ray: &Ray, _params: &PathParams, _sampler: &mut Sampler) -> Layers {
-    todo!()
+pub fn trace_layers(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Layers {
+    let Some(surface) = world.intersect(ray) else {
+        return Layers { emission: keep_finite(world.lights.environment(ray.d)), ..Layers::default() };
+    };
+    let wo = -ray.d;
+    let present = world.scene.materials[surface.material as usize].bsdf.lobes();
+    let layer = |lobes: Lobes, branch| {
+        if !present.intersects(lobes) {
+            return Rgb::ZERO;
+        }
+        let query = Query { lobes, ..Query::default() };
+        scattered(world, &surface, wo, query, params, &mut sampler.branch(branch))
+    };
+    Layers {
+        emission: keep_finite(world.lights.emitted(&world.scene, &surface, wo)),
+        diffuse: layer(Lobes::DIFFUSE, 0),
+        glossy: layer(Lobes::NON_DIFFUSE, 1),
+    }
 }
 
 /// Radiance scattered at `surface` towards `wo_world` (unit, away from the surface) by the lobes and at the roughness of
 /// `query`; later vertices scatter in full. Emission of `surface` itself is not included.
 /// The probe bake calls this with `Lobes::NON_DIFFUSE` and the halved roughness, the path tracer with either half.
 pub fn scattered(
-    _world: &World,
-    _surface: &Surface,
-    _wo_world: glam::Vec3,
-    _query: Query,
-    _params: &PathParams,
-    _sampler: &mut Sampler,
+    world: &World,
+    surface: &Surface,
+    wo_world: Vec3,
+    query: Query,
+    params: &PathParams,
+    sampler: &mut Sampler,
 ) -> Rgb {
-    let _ = Lobes::ALL;
-    todo!()
+    let measure = Measure::Scattering { wi: surface.frame.to_local(wo_world), query };
+    integrate(&Vertex { world, surface, measure }, params, sampler)
 }
 
 /// Incident, not scattered light: one sample of the light map's quantity ∫ T_in(ω) L(ω) cos θ dω at `surface`, on the side of
 /// `frame.n` (or its back with `back`), with T_in = [`super::bsdf::Bsdf::diffuse_in`]. L holds all paths, direct light included.
 pub fn transmitted_irradiance(
-    _world: &World,
-    _surface: &Surface,
-    _back: bool,
-    _params: &PathParams,
-    _sampler: &mut Sampler,
+    world: &World,
+    surface: &Surface,
+    back: bool,
+    params: &PathParams,
+    sampler: &mut Sampler,
 ) -> Rgb {
-    todo!()
+    let measure = Measure::Irradiance { side: if back { -1.0 } else { 1.0 } };
+    integrate(&Vertex { world, surface, measure }, params, sampler)
+}
+
+/// Radiance arriving from the far end of `ray`, emission included, without a split.
+pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+    let start = Start { ray: *ray, pdf: 1.0, delta: true, eta: 1.0, depth: 0 };
+    keep_finite(incident(world, start, params, sampler))
+}
+
+/// Samples that were not finite and counted as zero, since the program started (debug builds only).
+pub fn dropped_samples() -> u64 {
+    DROPPED.load(Ordering::Relaxed)
+}
+
+static DROPPED: AtomicU64 = AtomicU64::new(0);
+
+fn keep_finite(c: Rgb) -> Rgb {
+    if c.is_finite() {
+        return c;
+    }
+    if cfg!(debug_assertions) {
+        DROPPED.fetch_add(1, Ordering::Relaxed);
+    }
+    Rgb::ZERO
+}
+
+/// What incident radiance is integrated against at a vertex.
+#[derive(Clone, Copy)]
+enum Measure {
+    /// BSDF times cosine, seen from the local direction `wi`.
+    Scattering { wi: Vec3, query: Query },
+    /// Transmission into the diffuse layer times cosine, on the side of the frame's normal (1) or behind it (-1).
+    Irradiance { side: f32 },
+}
+
+/// A point of a path where light arrives.
+struct Vertex<'a> {
+    world: &'a World,
+    surface: &'a Surface,
+    measure: Measure,
+}
+
+/// A ray of a path and how it was found.
+#[derive(Clone, Copy)]
+struct Start {
+    ray: Ray,
+    /// Density with which `ray.d` was drawn at `ray.o`.
+    pdf: f32,
+    /// No emitter sample competes with it.
+    delta: bool,
+    /// Relative index of refraction so far.
+    eta: f32,
+    /// Vertices that have scattered before it.
+    depth: u32,
+}
+
+/// One sample of the integral of incident radiance at the first vertex of a path.
+fn integrate(vertex: &Vertex, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+    if params.max_depth == 0 {
+        return Rgb::ZERO;
+    }
+    let [light_x, light_y, light_choice, _] = sampler.next_4d();
+    let [x, y, lobe, _] = sampler.next_4d();
+    let mut sum = vertex.direct(light_choice, Vec2::new(light_x, light_y));
+    if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
+        let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
+        let start = Start { ray, pdf: sample.pdf, delta: sample.delta, eta: sample.eta, depth: 1 };
+        sum += sample.weight * incident(vertex.world, start, params, sampler);
+    }
+    keep_finite(sum)
+}
+
+/// Radiance along a ray: emission weighted against the emitter sampling at its origin, and all that is scattered on.
+fn incident(world: &World, start: Start, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+    let Start { mut ray, mut pdf, mut delta, mut eta, mut depth } = start;
+    let mut sum = Rgb::ZERO;
+    let mut throughput = Rgb::ONE;
+    loop {
+        let Some(surface) = world.intersect(&ray) else {
+            let light = world.lights.environment(ray.d);
+            if light != Rgb::ZERO {
+                let other = if delta { 0.0 } else { world.lights.pdf_environment(ray.d) };
+                sum += throughput * light * power_heuristic(pdf, other);
+            }
+            return sum;
+        };
+        let wo = -ray.d;
+        if surface.emitter.is_some() {
+            let light = world.lights.emitted(&world.scene, &surface, wo);
+            let other = if delta { 0.0 } else { world.lights.pdf_surface(ray.o, &surface) };
+            sum += throughput * light * power_heuristic(pdf, other);
+        }
+        if depth >= params.max_depth {
+            return sum;
+        }
+        let [light_x, light_y, light_choice, live] = sampler.next_4d();
+        let [x, y, lobe, _] = sampler.next_4d();
+        let measure = Measure::Scattering { wi: surface.frame.to_local(wo), query: Query::default() };
+        let vertex = Vertex { world, surface: &surface, measure };
+        sum += throughput * vertex.direct(light_choice, Vec2::new(light_x, light_y));
+        let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) else { return sum };
+        throughput *= sample.weight;
+        eta *= sample.eta;
+        depth += 1;
+        if depth >= params.rr_depth {
+            let survival = (throughput.max_element() * eta * eta).min(ROULETTE_CAP);
+            // Not `live >= survival`: a survival that is not a number ends the path, too.
+            if !(live < survival) {
+                return sum;
+            }
+            throughput /= survival;
+        }
+        (pdf, delta) = (sample.pdf, sample.delta);
+        ray = surface.spawn(surface.frame.to_world(sample.wo));
+    }
+}
+
+impl Vertex<'_> {
+    fn bsdf(&self) -> &Bsdf {
+        &self.world.scene.materials[self.surface.material as usize].bsdf
+    }
+
+    /// Next-event estimation: light straight from an emitter, weighted against finding it by [`Vertex::sample`].
+    fn direct(&self, choice: f32, v: Vec2) -> Rgb {
+        let world = self.world;
+        let Some(light) = world.lights.sample(&world.scene, self.surface.p, choice, v) else { return Rgb::ZERO };
+        let wo = self.surface.frame.to_local(light.wi);
+        let value = self.eval(wo);
+        if value == Rgb::ZERO || light.weight == Rgb::ZERO || world.occluded(&self.shadow_ray(&light)) {
+            return Rgb::ZERO;
+        }
+        let other = if light.delta { 0.0 } else { self.pdf(wo) };
+        light.weight * value * power_heuristic(light.pdf, other)
+    }
+
+    fn shadow_ray(&self, light: &LightSample) -> Ray {
+        if light.distance.is_finite() { self.surface.spawn_to(light.point) } else { self.surface.spawn(light.wi) }
+    }
+
+    /// What radiance from the local direction `wo` is multiplied with, cosine included.
+    fn eval(&self, wo: Vec3) -> Rgb {
+        match self.measure {
+            Measure::Scattering { wi, query } => self.bsdf().eval(self.surface, wi, wo, query),
+            Measure::Irradiance { side } => {
+                let cos = wo.z * side;
+                if cos > 0.0 { Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * cos) } else { Rgb::ZERO }
+            }
+        }
+    }
+
+    /// Density of [`Vertex::sample`], per solid angle.
+    fn pdf(&self, wo: Vec3) -> f32 {
+        match self.measure {
+            Measure::Scattering { wi, query } => self.bsdf().pdf(self.surface, wi, wo, query),
+            Measure::Irradiance { side } => (wo.z * side).max(0.0) * FRAC_1_PI,
+        }
+    }
+
+    /// Draws a local direction; its weight is [`Vertex::eval`] over pdf.
+    fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+        match self.measure {
+            Measure::Scattering { wi, query } => {
+                self.bsdf().sample(self.surface, wi, u, v, query).filter(|s| s.weight != Rgb::ZERO)
+            }
+            Measure::Irradiance { side } => {
+                let (sin_phi, cos_phi) = (v.x * TAU).sin_cos();
+                let (cos, sin) = ((1.0 - v.y).sqrt(), v.y.sqrt());
+                let wo = Vec3::new(sin * cos_phi, sin * sin_phi, cos * side);
+                let weight = Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * PI);
+                (cos > 0.0).then_some(BsdfSample { wo, weight, pdf: cos * FRAC_1_PI, delta: false, eta: 1.0 })
+            }
+        }
+    }
+}
+
+/// Weight of a sample of density `a` where another technique would have found it with density `b`.
+fn power_heuristic(a: f32, b: f32) -> f32 {
+    let ratio = b / a;
+    1.0 / (1.0 + ratio * ratio)
 }

@@ -1,35 +1,124 @@
 //! Sample points: Owen-scrambled Sobol, one decorrelated stream a pixel or texel.
+//!
+//! Ours: dimensions come in sets of four (Burley's padding: the first four Sobol dimensions again and again, each set
+//! scrambled and shuffled with a seed of its own), so that a set is well distributed in all its projections and sets are
+//! independent. A path draws two sets a vertex; past [`SOBOL_SETS`], where stratification no longer shows, sets are plain
+//! hashes, which cost a third.
 
+use crate::math::{hash_words, hash64};
 use glam::Vec2;
+
+/// Sets of four dimensions that are Sobol points; later ones are hashes. Eight path vertices.
+const SOBOL_SETS: u32 = 16;
 
 /// The sample dimensions of one path, drawn in order.
 #[derive(Debug, Clone)]
 pub struct Sampler {
     stream: u32,
     index: u32,
-    dimension: u32,
+    /// The set that is drawn next.
+    set: u32,
+    values: [f32; 4],
+    used: usize,
 }
 
 impl Sampler {
     /// Sample `index` of the stream `stream` (a hash of seed and pixel: see [`crate::math::hash_words`]).
     pub fn new(stream: u32, index: u32) -> Self {
-        Self { stream, index, dimension: 0 }
+        Self { stream, index, set: 0, values: [0.0; 4], used: 4 }
+    }
+
+    /// The same sample of another stream: one for each of several continuations of a path, which must not share numbers.
+    pub fn branch(&self, k: u32) -> Self {
+        Self::new(hash_words(&[self.stream, k]), self.index)
+    }
+
+    /// The next set of four dimensions, each in [0, 1); what is left of the set before is passed over.
+    pub fn next_4d(&mut self) -> [f32; 4] {
+        self.used = 4;
+        let set = self.set;
+        self.set += 1;
+        if set < SOBOL_SETS {
+            // The sequence ends at 2^16: longer ones go on with another scramble.
+            let seed = self.stream ^ (self.index >> 16).wrapping_mul(0x85eb_ca6b);
+            sobol_burley::sample_4d(self.index & 0xffff, 0, seed.wrapping_add(set.wrapping_mul(0x9e37_79b9)))
+        } else {
+            let key = (u64::from(self.stream) << 32 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let first = hash64(key ^ hash64(u64::from(set)));
+            let second = hash64(first.wrapping_add(0x9e37_79b9_7f4a_7c15));
+            let unit = |bits: u64| (bits as u32 >> 8) as f32 * (1.0 / 16_777_216.0);
+            [unit(first), unit(first >> 32), unit(second), unit(second >> 32)]
+        }
     }
 
     /// The next dimension, in [0, 1).
     pub fn next_1d(&mut self) -> f32 {
-        let (set, dimension) = (self.dimension / 256, self.dimension % 256);
-        self.dimension += 1;
-        sobol_burley::sample(
-            self.index % 65536,
-            dimension,
-            self.stream ^ set.wrapping_mul(0x9e37_79b9) ^ (self.index / 65536).wrapping_mul(0x85eb_ca6b),
-        )
+        self.refill_for(1);
+        self.used += 1;
+        self.values[self.used - 1]
     }
 
-    /// The next two dimensions.
+    /// The next two dimensions of one set.
     pub fn next_2d(&mut self) -> Vec2 {
-        let x = self.next_1d();
-        Vec2::new(x, self.next_1d())
+        self.refill_for(2);
+        self.used += 2;
+        Vec2::new(self.values[self.used - 2], self.values[self.used - 1])
+    }
+
+    fn refill_for(&mut self, n: usize) {
+        if self.used + n > 4 {
+            self.values = self.next_4d();
+            self.used = 0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixteen_samples_of_every_sobol_pair_fall_into_sixteen_squares() {
+        for set in 0..SOBOL_SETS {
+            let mut seen = [false; 16];
+            for index in 0..16 {
+                let mut s = Sampler::new(77, index);
+                (0..set).for_each(|_| _ = s.next_4d());
+                let p = s.next_2d();
+                seen[(p.x * 4.0) as usize * 4 + (p.y * 4.0) as usize] = true;
+            }
+            assert!(seen.iter().all(|&s| s), "set {set}");
+        }
+    }
+
+    #[test]
+    fn sets_and_branches_are_uncorrelated_and_uniform() {
+        const N: u32 = 4096;
+        let columns: Vec<Vec<f32>> = (0..2)
+            .flat_map(|branch| (0..2 * SOBOL_SETS).map(move |set| (branch, set)))
+            .map(|(branch, set)| {
+                let value = |index| {
+                    let mut s = Sampler::new(5, index).branch(branch);
+                    (0..set).for_each(|_| _ = s.next_4d());
+                    s.next_4d()[1]
+                };
+                (0..N).map(value).collect()
+            })
+            .collect();
+        for (i, a) in columns.iter().enumerate() {
+            assert!(a.iter().all(|x| (0.0..1.0).contains(x)));
+            let mean = a.iter().sum::<f32>() / N as f32;
+            assert!((mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / N as f32).sqrt(), "column {i}: mean {mean}");
+            for (j, b) in columns.iter().enumerate().take(i) {
+                let covariance = a.iter().zip(b).map(|(x, y)| (x - 0.5) * (y - 0.5)).sum::<f32>() / N as f32;
+                // Standard deviation of the estimate for independent columns: 1 / (12 sqrt N).
+                assert!(covariance.abs() < 5.0 / 12.0 / (N as f32).sqrt(), "columns {i}, {j}: covariance {covariance}");
+            }
+        }
+    }
+
+    #[test]
+    fn samples_past_the_sequence_differ_from_the_first() {
+        assert_ne!(Sampler::new(1, 3).next_4d(), Sampler::new(1, 3 + 65536).next_4d());
     }
 }
