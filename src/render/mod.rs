@@ -1,4 +1,5 @@
 //! TODO
+pub mod aov;
 /// See the module.
 pub mod composite;
 /// See the module.
@@ -11,5 +12,6 @@ pub mod gather;
 pub mod gbuffer;
 /// See the module.
 pub mod mirror;
+pub mod path_trace;
 /// See the module.
 pub mod perturb;

@@ -83,8 +83,7 @@ impl Envmap {
         let (width, height) = self.cells();
         let (y, vy) = pick(&self.rows, v.y);
         let (x, vx) = pick(&self.columns[y * (width + 1)..(y + 1) * (width + 1)], v.x);
-        let mut place =
-            Place { x: [x, (x + 1) % width], y: [y, (y + 1).min(self.image.height - 1)], at: Vec2::ZERO };
+        let mut place = Place { x: [x, (x + 1) % width], y: [y, (y + 1).min(self.image.height - 1)], at: Vec2::ZERO };
         let [[a, b], [c, d]] = self.corners(&place);
         place.at.y = sample_linear(vy, a + b, c + d);
         let ty = place.at.y;
@@ -182,8 +181,12 @@ mod tests {
     use super::*;
     use crate::transport::Sampler;
 
-    /// A map with a soft gradient, a sun of one pixel and a black quarter.
     fn test_map() -> Envmap {
+        test_map_turned(&Affine3A::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7))
+    }
+
+    /// A map with a soft gradient, a sun of one pixel and a black quarter.
+    fn test_map_turned(turn: &Affine3A) -> Envmap {
         let (width, height) = (16, 8);
         let pixel = |i: usize| match (i % width, i / width) {
             (5, 3) => Rgb::new(90.0, 80.0, 60.0),
@@ -191,8 +194,7 @@ mod tests {
             (x, y) => Rgb::new(0.2 + 0.1 * x as f32, 0.5, 0.1 * y as f32),
         };
         let image = Image { width, height, pixels: (0..width * height).map(pixel).collect() };
-        let turn = Affine3A::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
-        Envmap::new(&Arc::new(image), 2.0, &turn).unwrap()
+        Envmap::new(&Arc::new(image), 2.0, turn).unwrap()
     }
 
     /// Sums `f` over a fine lat-long grid, cell by cell: (index of the coarse bin, value, solid angle).
@@ -203,6 +205,26 @@ mod tests {
                 let sr = 2.0 * PI * PI * (uv.y * PI).sin() / (2 * fine * fine) as f32;
                 f((uv.y * 6.0) as usize * 12 + (uv.x * 12.0) as usize, direction_from_lat_long(uv), sr);
             }
+        }
+    }
+
+    /// Against Mitsuba 3.9.1 (`scalar_rgb`): the same image, scale 2, to_world = rotate y by 40 after x by 20 degrees.
+    #[test]
+    fn radiance_and_density_are_those_of_mitsuba() {
+        let turn = Affine3A::from_rotation_y(40f32.to_radians()) * Affine3A::from_rotation_x(20f32.to_radians());
+        let map = test_map_turned(&turn);
+        let mitsuba = [
+            ([0.3, 0.5, -0.2], [0.918_048, 1.0, 0.298_319], 0.024_218_6),
+            ([1.0, 0.0, 0.0], [143.402_66, 127.383_32, 95.507_93], 3.415_523_5),
+            ([-0.4, -0.8, 0.1], [2.560_707_6, 1.0, 1.203_011_6], 0.035_774_6),
+            ([0.05, 0.1, 0.9], [2.255_529_2, 1.0, 0.528_344_75], 0.032_071_4),
+            ([0.6, 0.2, -0.4], [1.104_313_9, 1.0, 0.570_108_5], 0.026_049_8),
+        ];
+        for (d, radiance, pdf) in mitsuba {
+            let d = Vec3::from(d).normalize();
+            let error = (map.eval(d) / Rgb::from(radiance) - 1.0).abs().max_element();
+            assert!(error < 1e-4, "{d}: {} where Mitsuba has {radiance:?}", map.eval(d));
+            assert!((map.pdf(d) / pdf - 1.0).abs() < 1e-3, "{d}: pdf {} where Mitsuba has {pdf}", map.pdf(d));
         }
     }
 

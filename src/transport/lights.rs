@@ -247,3 +247,121 @@ fn spot_falloff(cos: f32, cutoff_rad: f32, beam_rad: f32) -> f32 {
         a => (cutoff_rad - a) / (cutoff_rad - beam_rad),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Geometry, Object};
+    use crate::transport::Sampler;
+
+    fn scene(emitters: Vec<Emitter>) -> Scene {
+        Scene { emitters, ..Scene::default() }
+    }
+
+    /// A quadrilateral at height `y` over [-1, 1] x [-2, 2] that shines down with radiance 1 to 3 (RGB), and its scene.
+    fn lamp(y: f32, others: Vec<Emitter>) -> Scene {
+        let corner = |x: f32, z: f32| Vec3::new(x, y, z);
+        let geometry = Geometry {
+            positions: vec![corner(-1.0, -2.0), corner(1.0, -2.0), corner(1.0, 2.0), corner(-1.0, 2.0)],
+            normals: vec![Vec3::NEG_Y; 4],
+            uvs: vec![Vec2::ZERO; 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            triangle_object: vec![0, 0],
+            objects: vec![Object {
+                name: "lamp".into(),
+                triangles: 0..2,
+                vertices: 0..4,
+                material: 0,
+                emitter: Some(0),
+                face_normals: false,
+                has_uvs: false,
+            }],
+        };
+        let mut emitters = vec![Emitter::Area { object: 0, radiance: Texture::Constant(Rgb::new(1.0, 2.0, 3.0)) }];
+        emitters.extend(others);
+        Scene { geometry, emitters, ..Scene::default() }
+    }
+
+    #[test]
+    fn spot_point_and_directional_are_those_of_mitsuba() {
+        // Mitsuba 3.9.1: cutoff 40, beam 25 degrees, from (0, 3, 0) to (1, 0, 0.5).
+        let spot = Emitter::Spot {
+            position: Vec3::new(0.0, 3.0, 0.0),
+            direction: Vec3::new(1.0, -3.0, 0.5).normalize(),
+            intensity: Rgb::new(5.0, 4.0, 3.0),
+            cutoff_rad: 40f32.to_radians(),
+            beam_rad: 25f32.to_radians(),
+        };
+        let s = scene(vec![spot]);
+        let lights = Lights::new(&s);
+        for (p, red) in [([1.0, 0.0, 0.5], 0.487_804_9), ([0.0, 0.0, 0.0], 0.555_555_6), ([-0.5, 0.5, 0.0], 0.463_948_55)] {
+            let sample = lights.sample(&s, p.into(), 0.5, Vec2::splat(0.5)).unwrap();
+            assert!((sample.weight.x - red).abs() < 1e-5, "{p:?}: {} where Mitsuba has {red}", sample.weight.x);
+            assert!((sample.weight.z - red * 0.6).abs() < 1e-5 && sample.delta && sample.pdf == 1.0);
+        }
+        assert!(lights.sample(&s, Vec3::new(-3.0, 0.0, 0.0), 0.5, Vec2::splat(0.5)).is_none(), "outside of the cone");
+
+        let two = vec![
+            Emitter::Point { position: Vec3::Y * 2.0, intensity: Rgb::splat(8.0) },
+            Emitter::Directional { direction: Vec3::NEG_Y, irradiance: Rgb::splat(7.0) },
+        ];
+        let s = scene(two);
+        let lights = Lights::new(&s);
+        let point = lights.sample(&s, Vec3::ZERO, 0.2, Vec2::ZERO).unwrap();
+        assert_eq!((point.wi, point.distance, point.weight), (Vec3::Y, 2.0, Rgb::splat(2.0 * 8.0 / 4.0)));
+        let sun = lights.sample(&s, Vec3::ZERO, 0.7, Vec2::ZERO).unwrap();
+        assert_eq!((sun.wi, sun.distance, sun.weight), (Vec3::Y, f32::INFINITY, Rgb::splat(2.0 * 7.0)));
+    }
+
+    #[test]
+    fn a_lamp_seen_from_below_fills_its_solid_angle() {
+        const N: u32 = 4096;
+        let s = lamp(1.5, vec![]);
+        let lights = Lights::new(&s);
+        let p = Vec3::new(0.3, 0.0, -0.2);
+        let sum: Rgb = (0..N).map(|i| lights.sample(&s, p, 0.0, Sampler::new(1, i).next_2d()).unwrap().weight / N as f32).sum();
+        // Solid angle of a rectangle, corner by corner: atan(a b / (h sqrt(a² + b² + h²))).
+        let corner = |a: f32, b: f32| (a * b / (1.5 * (a * a + b * b + 1.5 * 1.5).sqrt())).atan();
+        let solid_angle = corner(1.3, 1.8) + corner(0.7, 1.8) + corner(1.3, 2.2) + corner(0.7, 2.2);
+        assert!((sum / Rgb::new(1.0, 2.0, 3.0) / solid_angle - 1.0).abs().max_element() < 2e-3, "{sum}, {solid_angle} sr");
+        let above = Vec3::new(0.0, 3.0, 0.0);
+        assert!(lights.sample(&s, above, 0.0, Vec2::splat(0.4)).is_none(), "dark from behind");
+    }
+
+    #[test]
+    fn the_density_of_a_found_point_is_the_one_it_is_sampled_with() {
+        let s = lamp(1.5, vec![Emitter::Constant { radiance: Rgb::ONE }, Emitter::Constant { radiance: Rgb::ZERO }]);
+        let lights = Lights::new(&s);
+        let p = Vec3::new(-0.6, 0.1, 0.4);
+        for i in 0..64 {
+            let v = Sampler::new(2, i).next_2d();
+            let sample = lights.sample(&s, p, 0.25, v).unwrap();
+            let found = Surface {
+                p: sample.point,
+                ng: Vec3::NEG_Y,
+                frame: crate::math::Frame::from_normal(Vec3::NEG_Y),
+                uv: Vec2::ZERO,
+                dp_du: Vec3::ZERO,
+                dp_dv: Vec3::ZERO,
+                t: sample.distance,
+                triangle: 0,
+                barycentric: Vec2::ZERO,
+                object: 0,
+                material: 0,
+                emitter: Some(0),
+            };
+            assert!((lights.pdf_surface(p, &found) / sample.pdf - 1.0).abs() < 1e-4);
+            assert_eq!(lights.emitted(&s, &found, -sample.wi), Rgb::new(1.0, 2.0, 3.0));
+            assert_eq!(lights.emitted(&s, &found, sample.wi), Rgb::ZERO);
+            let sky = lights.sample(&s, p, 0.75, v).unwrap();
+            assert!((sky.pdf - 0.5 * 0.25 / PI).abs() < 1e-6 && (sky.pdf - lights.pdf_environment(sky.wi)).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn a_scene_without_light_gives_no_sample() {
+        let s = scene(vec![]);
+        assert!(Lights::new(&s).is_empty());
+        assert!(Lights::new(&s).sample(&s, Vec3::ZERO, 0.5, Vec2::ZERO).is_none());
+    }
+}

@@ -89,13 +89,7 @@ pub fn scattered(
 
 /// Incident, not scattered light: one sample of the light map's quantity ∫ T_in(ω) L(ω) cos θ dω at `surface`, on the side of
 /// `frame.n` (or its back with `back`), with T_in = [`super::bsdf::Bsdf::diffuse_in`]. L holds all paths, direct light included.
-pub fn transmitted_irradiance(
-    world: &World,
-    surface: &Surface,
-    back: bool,
-    params: &PathParams,
-    sampler: &mut Sampler,
-) -> Rgb {
+pub fn transmitted_irradiance(world: &World, surface: &Surface, back: bool, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     let measure = Measure::Irradiance { side: if back { -1.0 } else { 1.0 } };
     integrate(&Vertex { world, surface, measure }, params, sampler)
 }
@@ -203,8 +197,7 @@ fn incident(world: &World, start: Start, params: &PathParams, sampler: &mut Samp
         depth += 1;
         if depth >= params.rr_depth {
             let survival = (throughput.max_element() * eta * eta).min(ROULETTE_CAP);
-            // Not `live >= survival`: a survival that is not a number ends the path, too.
-            if !(live < survival) {
+            if live >= survival {
                 return sum;
             }
             throughput /= survival;

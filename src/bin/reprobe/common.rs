@@ -96,6 +96,15 @@ impl Common {
     }
 }
 
+/// Parses `WIDTHxHEIGHT`, pixels.
+pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    const MOST: u32 = 16384;
+    let expected = || format!("\"{text}\": expected WIDTHxHEIGHT, each from 1 to {MOST}, like 960x540");
+    let (w, h) = text.split_once('x').ok_or_else(expected)?;
+    let side = |s: &str| s.parse().ok().filter(|n| (1..=MOST).contains(n)).ok_or_else(expected);
+    Ok([side(w)?, side(h)?])
+}
+
 /// Shows a stage's progress with the time left.
 pub struct Bar {
     hidden: bool,

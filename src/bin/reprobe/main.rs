@@ -10,6 +10,7 @@ mod qhmap;
 mod render_path;
 mod resmap;
 mod run;
+mod timings;
 
 use clap::Parser;
 use common::Common;

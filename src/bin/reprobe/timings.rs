@@ -1,0 +1,77 @@
+//! `timings.json`: milliseconds a pass and frame, and memory. Kept apart from the frames, whose bits must not depend on it.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// What a run took.
+#[derive(Serialize, Default)]
+pub struct Timings {
+    /// `--method`.
+    pub method: String,
+    /// Worker threads.
+    pub threads: usize,
+    /// Scene loading, milliseconds.
+    pub load_ms: f64,
+    /// Acceleration structures, milliseconds.
+    pub build_ms: f64,
+    /// Frames in order.
+    pub frames: Vec<FrameTimings>,
+    /// Mean of each pass over the frames rendered in this run, milliseconds.
+    pub mean_ms: BTreeMap<String, f64>,
+    /// Most memory that the process has held, bytes; `None` where the system does not say.
+    pub peak_memory_bytes: Option<u64>,
+}
+
+/// What a frame took.
+#[derive(Serialize, Default)]
+pub struct FrameTimings {
+    /// File name.
+    pub name: String,
+    /// An earlier run had finished it.
+    pub kept: bool,
+    /// Milliseconds of each pass.
+    pub passes_ms: BTreeMap<String, f64>,
+}
+
+impl Timings {
+    /// Fills in the means and the memory.
+    pub fn finish(&mut self) {
+        let mut sums = BTreeMap::<String, (f64, u32)>::new();
+        for (pass, ms) in self.frames.iter().flat_map(|f| &f.passes_ms) {
+            let (sum, count) = sums.entry(pass.clone()).or_default();
+            *sum += ms;
+            *count += 1;
+        }
+        self.mean_ms = sums.into_iter().map(|(pass, (sum, count))| (pass, sum / f64::from(count))).collect();
+        self.peak_memory_bytes = peak_memory();
+    }
+}
+
+impl FrameTimings {
+    /// Runs a pass and notes its time.
+    pub fn pass<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
+        let (result, ms) = timed(work);
+        self.passes_ms.insert(name.into(), ms);
+        result
+    }
+}
+
+/// The result of `work` and its milliseconds.
+pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = Instant::now();
+    let result = work();
+    (result, milliseconds(start.elapsed()))
+}
+
+fn milliseconds(d: Duration) -> f64 {
+    (d.as_secs_f64() * 1e6).round() / 1e3
+}
+
+/// High-water mark of the resident set, from Linux's `/proc`.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
