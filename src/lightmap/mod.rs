@@ -1,7 +1,31 @@
-//! TODO
-/// See the module.
+//! The diffuse light map, L(S|D)*DE: E_T(x) = ∫ T_in(ω) L(ω) cos θ dω over an atlas of charts.
+//!
+//! Paper: §3 and §5 take "a standard light map" as given, so everything here is *Ours*:
+//! - [`adjacency`]: which triangles of an object meet, and whether the surface is smooth there.
+//! - [`chart`]: patches that one plane shows without folds.
+//! - [`pack`] and [`atlas`]: their places in one image, with gutters.
+//! - [`texels`]: what part of each texel the surface covers, and sample points on it.
+//! - [`solid`] and [`visible`]: samples inside or behind other geometry.
+//! - [`bake`]: the integral, in blocks that can be kept ([`parts`]) and taken up again.
+//! - [`fill`] and [`seam`]: gutters, texels without a value, and chart borders on smooth surfaces.
+//! - [`lookup`]: the file, and a bilinear lookup for a triangle and its barycentrics.
+//!
+//! The diffuse layer of a pixel is `diffuse_out(view) · E_T / π` with the albedo texture at full resolution.
+
+pub mod adjacency;
 pub mod atlas;
-/// See the module.
 pub mod bake;
-/// See the module.
+pub mod chart;
+pub mod fill;
 pub mod lookup;
+pub mod pack;
+pub mod parts;
+pub mod seam;
+pub mod solid;
+#[cfg(test)]
+mod testing;
+pub mod texels;
+pub mod visible;
+
+pub use atlas::{Atlas, AtlasParams};
+pub use lookup::LightMap;
