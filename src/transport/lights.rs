@@ -349,6 +349,7 @@ mod tests {
                 object: 0,
                 material: 0,
                 emitter: Some(0),
+                offset: 0.0,
             };
             assert!((lights.pdf_surface(p, &found) / sample.pdf - 1.0).abs() < 1e-4);
             assert_eq!(lights.emitted(&s, &found, -sample.wi), Rgb::new(1.0, 2.0, 3.0));
