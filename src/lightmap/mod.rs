@@ -28,4 +28,5 @@ pub mod texels;
 pub mod visible;
 
 pub use atlas::{Atlas, AtlasParams};
+pub use bake::{BakeParams, Baked, Plan};
 pub use lookup::LightMap;
