@@ -135,7 +135,7 @@ impl<'a> Plan<'a> {
         let mut found = 0;
         for b in blocks {
             let items = self.block(b);
-            if store.has(b, items.len()) {
+            if self.has(store, b) {
                 found += 1;
                 progress.advance(items.len() as u64);
                 continue;
@@ -154,9 +154,9 @@ impl<'a> Plan<'a> {
         Ok(found)
     }
 
-    /// Blocks that `store` lacks.
-    pub fn missing(&self, store: &dyn Store) -> u32 {
-        (0..self.blocks()).filter(|&b| !store.has(b, self.block(b).len())).count() as u32
+    /// Whether `store` has a finished block.
+    pub fn has(&self, store: &dyn Store, block: u32) -> bool {
+        store.has(block, self.block(block).len())
     }
 
     /// Puts the blocks together: gutters, texels that nobody sees, seams.

@@ -160,7 +160,8 @@ mod tests {
             close(&geometry, &atlas, &mut pixels, &baked, &|_| true);
         }
         let map = sides(&geometry, &atlas, pixels, None);
-        let corner = |e: u8, t: f32| [Vec2::ZERO, Vec2::X, Vec2::Y][e as usize].lerp([Vec2::X, Vec2::Y, Vec2::ZERO][e as usize], t);
+        let corner =
+            |e: u8, t: f32| [Vec2::ZERO, Vec2::X, Vec2::Y][e as usize].lerp([Vec2::X, Vec2::Y, Vec2::ZERO][e as usize], t);
         let (mut sum, mut largest, mut count) = (0.0, 0f32, 0);
         for seam in &atlas.seams {
             for i in 0..10 {

@@ -1,11 +1,108 @@
 //! `reprobe bake-lightmap`.
 
 use crate::common::{Common, Outcome};
+use anyhow::bail;
+use reprobe::io::{ExrImage, Provenance};
+use reprobe::lightmap::parts::Folder;
+use reprobe::lightmap::{AtlasParams, BakeParams, Plan, lookup};
+use reprobe::transport::World;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
 
-/// Not yet
+/// Bake the diffuse light map
+///
+/// Each texel becomes the light that enters the diffuse layer there; albedo stays out of it, so that textures keep their full
+/// resolution. Finished blocks are kept in OUTPUT.parts until the map is whole: a killed bake goes on from them.
 #[derive(clap::Args)]
-pub struct Args {}
+#[command(after_help = "Examples:
+  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512
+  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512 --shard 0/4")]
+pub struct Args {
+    /// Mitsuba scene, XML or JSON
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// The light map to write
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Samples a texel
+    #[arg(long, value_name = "N", default_value_t = BakeParams::default().spp, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    spp: u32,
+    /// Edge of a texel, metres [default: what gives the surfaces 2 million texels]
+    #[arg(long, value_name = "M")]
+    texel: Option<f32>,
+    /// Bake blocks I, I+N, I+2N, ... only; the shard that completes them writes the map
+    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    shard: Option<(u32, u32)>,
+}
 
-pub fn run(_args: &Args, _common: &Common) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not yet")
+fn parse_shard(text: &str) -> Result<(u32, u32), String> {
+    let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    parsed.filter(|(i, n)| i < n).ok_or_else(|| "expected I/N with I from 0 to N-1, like 0/4".into())
+}
+
+pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
+    let began = Instant::now();
+    if args.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
+        bail!("-o {}: expected a file name that ends in .exr", args.output.display());
+    }
+    let (world, left_out) = World::opaque(common.load_scene(&args.scene)?);
+    if left_out > 0 {
+        eprintln!("reprobe: warning: {left_out} transmissive shapes are left out of the light map");
+    }
+    let params =
+        BakeParams { spp: args.spp, atlas: AtlasParams { texel: args.texel, ..Default::default() }, ..Default::default() };
+    let plan = Plan::new(&world, &params, common.seed)?;
+    let atlas = &plan.atlas;
+    let provenance = Provenance::new("bake-lightmap", &world.scene.hash, common.seed, &params);
+    let store = Folder::new(&parts_folder(&args.output), &serde_json::to_string(&provenance)?);
+
+    let planned = began.elapsed().as_secs_f64();
+    let mine = |b: u32| args.shard.is_none_or(|(i, n)| b % n == i);
+    let kept = plan.run(&store, &mine, &common.progress())?;
+    let missing = (0..plan.blocks()).filter(|&b| !mine(b) && !plan.has(&store, b)).count();
+    if missing == 0 {
+        write(&plan, &world, &store, provenance, &args.output)?;
+    }
+    let seconds = began.elapsed().as_secs_f64();
+    let [width, height] = atlas.size;
+    let state = if missing > 0 { format!("; {missing} blocks are still missing: run the other shards") } else { String::new() };
+    Ok(Outcome {
+        summary: format!(
+            "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples, {} of {} blocks kept from before, {seconds:.1} s{state}",
+            args.output.display(),
+            atlas.charts.len(),
+            atlas.texel,
+            plan.len(),
+            plan.backs(),
+            args.spp,
+            kept,
+            plan.blocks(),
+        ),
+        figures: json!({
+            "size": atlas.size, "charts": atlas.charts.len(), "texel": atlas.texel, "texels": plan.len(), "backs": plan.backs(),
+            "spp": args.spp, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
+            "seconds_atlas": planned, "seconds": seconds,
+        }),
+        ..Outcome::default()
+    })
+}
+
+fn parts_folder(output: &Path) -> PathBuf {
+    let mut name = output.as_os_str().to_owned();
+    name.push(".parts");
+    name.into()
+}
+
+/// Puts the blocks together, writes the map and then deletes them.
+fn write(plan: &Plan, world: &World, store: &Folder, provenance: Provenance, output: &Path) -> anyhow::Result<()> {
+    let baked = match plan.assemble(store) {
+        Ok(baked) => baked,
+        // Another shard was faster and has deleted the blocks.
+        Err(_) if ExrImage::read(output).is_ok_and(|i| i.provenance.as_ref() == Some(&provenance)) => return Ok(()),
+        Err(e) => return Err(e.into()),
+    };
+    lookup::encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance).write(output)?;
+    store.remove()?;
+    Ok(())
 }
