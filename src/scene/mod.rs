@@ -2,15 +2,24 @@
 //!
 //! [`load`] reads Mitsuba XML (0.5 to 3) or the JSON form of the same tree.
 
+pub mod assets;
 pub mod camera;
 pub mod emitter;
 pub mod geometry;
+pub mod hash;
+pub mod image;
+pub mod ior;
+pub mod json;
 pub mod load;
 pub mod material;
+pub mod params;
 pub mod path;
 pub mod shapes;
+pub mod spectrum;
 pub mod texture;
+pub mod transform;
 pub mod tree;
+pub mod xml;
 
 use std::path::PathBuf;
 
@@ -32,6 +41,8 @@ pub struct Scene {
     pub emitters: Vec<Emitter>,
     /// The scene file's own sensor.
     pub sensor: Option<Camera>,
+    /// The integrator's `max_depth`, in Mitsuba's counting (1: emission only); `None` is unbounded.
+    pub max_depth: Option<u32>,
     /// blake3 of the tree and of every file that it names, in hex: what provenance compares.
     pub hash: String,
     /// The file that was loaded.
