@@ -70,6 +70,16 @@ const MIN_COS: f32 = 1e-3;
 /// Shortest distance to the eye or the reflected point, m.
 const MIN_DISTANCE: f32 = 1e-4;
 
+/// G = ∂F/∂u of the module's text: the second derivative of the path's length along the principal directions of the reflector,
+/// for the local unit direction `e` to the eye, `c` = 1/r_p + 1/r_q and the principal curvatures `k`.
+pub fn path_hessian(e: Vec3, c: f32, k: Vec2) -> Mat2 {
+    let bend = 2.0 * e.z * k;
+    Mat2::from_cols(
+        Vec2::new(c * (1.0 - e.x * e.x) + bend.x, -c * e.x * e.y),
+        Vec2::new(-c * e.x * e.y, c * (1.0 - e.y * e.y) + bend.y),
+    )
+}
+
 /// A mirror path p-x-q, ready to be moved to other eyes.
 #[derive(Debug, Clone, Copy)]
 pub struct Perturbation {
@@ -93,22 +103,15 @@ impl Perturbation {
     pub fn new(p: Vec3, x: Vec3, n: Vec3, reflected_distance: f32, curvature: &Curvature, params: &PerturbParams) -> Self {
         let frame = Frame::from_normal_and_tangent(n, curvature.d1);
         let mut e = frame.to_local((p - x).try_normalize().unwrap_or(n));
-        if !(e.z >= MIN_COS) {
+        if e.z.is_nan() || e.z < MIN_COS {
             e = Vec3::new(e.x, e.y, MIN_COS).normalize_or(Vec3::Z);
         }
         let inv_rp = 1.0 / p.distance(x).max(MIN_DISTANCE);
         let inv_rq = if reflected_distance.is_nan() { 0.0 } else { 1.0 / reflected_distance.max(MIN_DISTANCE) };
-        let plane = |k: Vec2| {
-            let c = inv_rp + inv_rq;
-            let (t, a) = (Vec2::new(e.x, e.y), 2.0 * e.z * k);
-            Mat2::from_cols(
-                Vec2::new(c * (1.0 - t.x * t.x) + a.x, -c * t.x * t.y),
-                Vec2::new(-c * t.x * t.y, c * (1.0 - t.y * t.y) + a.y),
-            )
-        };
         let mut k = if params.order == Order::Plane { Vec2::ZERO } else { Vec2::new(curvature.k1, curvature.k2) };
-        let mut g = plane(k);
-        let g_plane = plane(Vec2::ZERO);
+        let c = inv_rp + inv_rq;
+        let mut g = path_hessian(e, c, k);
+        let g_plane = path_hessian(e, c, Vec2::ZERO);
         let focus = g.determinant().abs() / g_plane.determinant();
         if !(focus >= params.min_focus && focus.is_finite()) {
             (k, g) = (Vec2::ZERO, g_plane);
@@ -125,8 +128,8 @@ impl Perturbation {
         if self.params.order == Order::Second {
             let second = 0.5 * self.second_order(dp, first);
             let rest = if self.params.exact_plane { second + plane_first * rise } else { second };
-            // A limit of infinity times a step of zero must not become NaN.
-            u += rest.clamp_length_max((self.params.second_order_limit * first.length()).max(0.0).min(f32::MAX));
+            let limit = self.params.second_order_limit * first.length();
+            u += if rest.length() > limit { rest.clamp_length_max(limit) } else { rest };
         }
         if !u.is_finite() {
             u = Vec2::ZERO;
