@@ -1,8 +1,23 @@
 //! A rough dielectric coating over a diffuse base (Mitsuba's `roughplastic`).
+//!
+//! The base sees the light that the coating lets through, averaged over its facets: a table over the cosine, and the
+//! share of the base's own light that the coating throws back. Both belong to the material's alpha;
+//! [`Query::roughness_scale`] changes the specular lobe alone.
 
-use super::microfacet::Distribution;
+use super::albedo::{lobe_albedo, reflected_mean, transmitted_mean};
+use super::microfacet::{ALPHA_MIN, Distribution, Microfacets};
 use super::plastic::PlasticParams;
-use crate::Result;
+use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
+use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio};
+use crate::math::{Rgb, reflect};
+use crate::{Error, Result};
+use glam::{Vec2, Vec3};
+
+/// Cosines at which the transmittance is tabulated, evenly from 0 to 1 (Mitsuba's count; it shows at grazing angles).
+const COSINES: usize = 64;
+/// Sides of the grids of samples behind an entry; internal reflection has a kink at the critical angle.
+const EXTERNAL_SAMPLES: usize = 32;
+const INTERNAL_SAMPLES: usize = 48;
 
 /// The model, with its tables of transmittance.
 #[derive(Debug, Clone)]
@@ -13,11 +28,108 @@ pub struct RoughPlastic {
     pub alpha: f32,
     /// Microfacet family.
     pub distribution: Distribution,
+    eta: f32,
+    transmittance: [f32; COSINES],
+    internal_reflectance: f32,
+    /// 2 ∫ transmittance cos dcos.
+    mean_transmittance: f32,
 }
 
 impl RoughPlastic {
-    /// Refuses indices of refraction that are not positive and finite; raises `alpha` to [`super::microfacet::ALPHA_MIN`].
+    /// Refuses indices of refraction that are not positive and finite; raises `alpha` to [`ALPHA_MIN`].
     pub fn new(params: PlasticParams, alpha: f32, distribution: Distribution) -> Result<Self> {
-        Ok(Self { params, alpha, distribution })
+        let eta = positive_ratio("roughplastic", params.int_ior, params.ext_ior)?;
+        if !alpha.is_finite() {
+            return Err(Error::Request(format!("roughplastic: alpha is {alpha}, expected a number")));
+        }
+        let alpha = alpha.max(ALPHA_MIN);
+        let facets = Microfacets::new(distribution, Vec2::splat(alpha));
+        let cosine = |i: usize| (i as f32 / (COSINES - 1) as f32).max(1e-6);
+        let transmittance: [f32; COSINES] = std::array::from_fn(|i| transmitted_mean(&facets, cosine(i), EXTERNAL_SAMPLES, eta));
+        // Mitsuba's own quadrature over the cosine: the plain mean of the nodes.
+        let mean = |f: &dyn Fn(usize) -> f32| (0..COSINES).map(|i| f(i) * cosine(i)).sum::<f32>() * 2.0 / COSINES as f32;
+        let internal_reflectance =
+            mean(&|i| reflected_mean(&facets, cosine(i), INTERNAL_SAMPLES, |c| Vec2::X * fresnel::dielectric(c, 1.0 / eta).r).x);
+        let mean_transmittance = mean(&|i| transmittance[i]);
+        Ok(Self { params, alpha, distribution, eta, transmittance, internal_reflectance, mean_transmittance })
+    }
+
+    fn transmitted(&self, w: Vec3) -> f32 {
+        let x = w.z.clamp(0.0, 1.0) * (COSINES - 1) as f32;
+        let i = (x as usize).min(COSINES - 2);
+        let (a, b) = (self.transmittance[i], self.transmittance[i + 1]);
+        a + (b - a) * (x - i as f32)
+    }
+
+    fn facets(&self, query: Query) -> Microfacets {
+        Microfacets::new(self.distribution, Vec2::splat(self.alpha * query.roughness_scale))
+    }
+}
+
+impl Scatter for RoughPlastic {
+    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return (Rgb::ZERO, 0.0);
+        }
+        let t_i = self.transmitted(wi);
+        let p = self.params.specular_probability(s, 1.0 - t_i, query);
+        let (mut value, mut density) = (Rgb::ZERO, 0.0);
+        if query.lobes.contains(Lobes::NON_DIFFUSE) {
+            let facets = self.facets(query);
+            let m = (wi + wo).normalize_or_zero();
+            let visible = 0.25 * facets.d(m) * facets.g1_over_cos(wi, m);
+            if visible > 0.0 {
+                let f = fresnel::dielectric(wi.dot(m), self.eta).r;
+                value += self.params.specular_reflectance.eval(s.uv) * (f * visible * facets.g1(wo, m));
+                density += p * visible;
+            }
+        }
+        if query.lobes.contains(Lobes::DIFFUSE) {
+            let cosine = cosine_hemisphere_pdf(wo);
+            value += self.params.base(s, self.eta, self.internal_reflectance) * (t_i * self.transmitted(wo) * cosine);
+            density += (1.0 - p) * cosine;
+        }
+        (value, density)
+    }
+
+    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
+        if wi.z <= 0.0 {
+            return None;
+        }
+        let p = self.params.specular_probability(s, 1.0 - self.transmitted(wi), query);
+        let wo = if u < p { reflect(wi, self.facets(query).sample(wi, v)).normalize_or_zero() } else { cosine_hemisphere(v) };
+        let (value, pdf) = self.eval_pdf(s, wi, wo, query);
+        BsdfSample::reflected(wo, value / pdf, pdf)
+    }
+
+    fn lobes(&self) -> Lobes {
+        Lobes::ALL
+    }
+
+    fn diffuse_out(&self, s: &Surface, wi: Vec3) -> Rgb {
+        if wi.z <= 0.0 {
+            return Rgb::ZERO;
+        }
+        self.params.base(s, self.eta, self.internal_reflectance) * self.transmitted(wi)
+    }
+
+    fn diffuse_in(&self, _s: &Surface, wo: Vec3) -> f32 {
+        if wo.z > 0.0 { self.transmitted(wo) } else { 0.0 }
+    }
+
+    fn diffuse_albedo(&self, s: &Surface, wi: Vec3) -> Rgb {
+        self.diffuse_out(s, wi) * self.mean_transmittance
+    }
+
+    fn glossy_albedo(&self, s: &Surface, wi: Vec3, query: Query) -> Rgb {
+        if wi.z <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let (energy, cos) = lobe_albedo(self.distribution, self.alpha * query.roughness_scale, wi.z);
+        self.params.specular_reflectance.eval(s.uv) * (energy * fresnel::dielectric(cos, self.eta).r)
+    }
+
+    fn alpha(&self, _s: &Surface) -> Option<f32> {
+        Some(self.alpha)
     }
 }

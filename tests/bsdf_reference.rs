@@ -1,0 +1,254 @@
+//! Our scattering models against Mitsuba's values, stored by scripts/bsdf_reference.py.
+
+use glam::{Affine2, Vec2, Vec3};
+use reprobe::math::{Frame, Rgb};
+use reprobe::scene::Texture;
+use reprobe::scene::texture::{Bitmap, Image, Wrap};
+use reprobe::transport::Surface;
+use reprobe::transport::bsdf::*;
+use serde::Deserialize;
+use std::sync::Arc;
+
+#[derive(Deserialize)]
+struct Reference {
+    wi: Vec<Vec3Json>,
+    wo: Vec<Vec3Json>,
+    cases: Vec<Case>,
+    samples: Vec<SampleCase>,
+}
+
+type Vec3Json = [f32; 3];
+
+/// Rows over wi, then wo: eval (diffuse RGB, non-diffuse RGB; or the whole, where not split) and pdf.
+#[derive(Deserialize)]
+struct Case {
+    model: String,
+    uv: [f32; 2],
+    split: bool,
+    rows: Vec<Vec<f32>>,
+}
+
+/// A delta sample: wo, weight, pdf, eta; null where the model is black.
+#[derive(Deserialize)]
+struct SampleCase {
+    model: String,
+    wi: Vec3Json,
+    u: f32,
+    sample: Option<[f32; 8]>,
+}
+
+fn reference() -> Reference {
+    serde_json::from_str(include_str!("data/bsdf_reference.json")).unwrap()
+}
+
+fn grey(v: f32) -> Texture {
+    Texture::Constant(Rgb::splat(v))
+}
+
+const ORANGE: Texture = Texture::Constant(Rgb::new(0.8, 0.4, 0.1));
+const PINK: Texture = Texture::Constant(Rgb::new(0.9, 0.6, 0.7));
+
+/// The surface of the script's `interaction`.
+fn surface(uv: [f32; 2]) -> Surface {
+    let (dp_du, dp_dv) = (Vec3::new(1.3, 0.2, 0.0), Vec3::new(-0.1, 0.9, 0.0));
+    let n = Vec3::new(0.1, 0.2, 1.0).normalize();
+    Surface {
+        p: Vec3::ZERO,
+        ng: Vec3::Z,
+        frame: Frame::from_normal_and_tangent(n, dp_du),
+        uv: uv.into(),
+        dp_du,
+        dp_dv,
+        t: 1.0,
+        triangle: 0,
+        barycentric: Vec2::ZERO,
+        object: 0,
+        material: 0,
+        emitter: None,
+    }
+}
+
+fn bitmap(offset: f32, wrap: Wrap, to_uv: Affine2) -> Texture {
+    let value = |x: usize, y: usize, c: usize| ((3 * x + 5 * y + 2 * c) % 7) as f32 / 10.0 + offset;
+    let pixels = (0..12).map(|i| (i % 4, i / 4)).map(|(x, y)| Vec3::new(value(x, y, 0), value(x, y, 1), value(x, y, 2)));
+    let image = Arc::new(Image { width: 4, height: 3, pixels: pixels.collect() });
+    Texture::Bitmap(Bitmap { image, to_uv, nearest: false, wrap, scale: 1.0 })
+}
+
+fn plastic_params(nonlinear: bool) -> PlasticParams {
+    PlasticParams { int_ior: 1.5, ext_ior: 1.0, nonlinear, diffuse_reflectance: ORANGE, specular_reflectance: PINK }
+}
+
+fn plastic(nonlinear: bool) -> Bsdf {
+    Bsdf::Plastic(Box::new(Plastic::new(plastic_params(nonlinear)).unwrap()))
+}
+
+fn roughplastic(alpha: f32, distribution: Distribution, nonlinear: bool) -> Bsdf {
+    Bsdf::RoughPlastic(Box::new(RoughPlastic::new(plastic_params(nonlinear), alpha, distribution).unwrap()))
+}
+
+fn metal(specular_reflectance: Texture) -> Conductor {
+    Conductor { eta: Rgb::new(0.2, 0.92, 1.1), k: Rgb::new(3.9, 2.45, 2.1), specular_reflectance }
+}
+
+fn roughconductor(alpha: [f32; 2], distribution: Distribution, specular: Texture) -> Bsdf {
+    let [alpha_u, alpha_v] = alpha.map(grey);
+    Bsdf::RoughConductor(Box::new(RoughConductor { metal: metal(specular), alpha_u, alpha_v, distribution }))
+}
+
+fn glass(specular_transmittance: Texture) -> DielectricParams {
+    DielectricParams { int_ior: 1.5, ext_ior: 1.0, specular_reflectance: grey(1.0), specular_transmittance }
+}
+
+fn roughdielectric(alpha: f32, distribution: Distribution, transmittance: Texture) -> Bsdf {
+    let model = RoughDielectric::new(glass(transmittance), grey(alpha), grey(alpha), distribution);
+    Bsdf::RoughDielectric(Box::new(model.unwrap()))
+}
+
+fn principled(params: PrincipledParams) -> Bsdf {
+    Bsdf::Principled(Box::new(Principled::new(PrincipledParams { base_color: ORANGE, ..params }).unwrap()))
+}
+
+fn bump(texture: Texture, scale: f32, nested: Bsdf) -> Bsdf {
+    Bsdf::BumpMap(BumpMap { texture, scale, nested: Box::new(nested) })
+}
+
+fn normal(texture: Texture, nested: Bsdf) -> Bsdf {
+    Bsdf::NormalMap(NormalMap { texture, nested: Box::new(nested) })
+}
+
+fn twosided(model: Bsdf) -> Bsdf {
+    Bsdf::TwoSided(TwoSided::new(model.clone(), model).unwrap())
+}
+
+/// The script's model of that name.
+fn model(name: &str) -> Bsdf {
+    use Distribution::{Beckmann, Ggx};
+    let diffuse = || Bsdf::Diffuse(Diffuse { reflectance: ORANGE });
+    let anisotropic = || roughconductor([0.3, 0.1], Ggx, grey(1.0));
+    let defaults = PrincipledParams::default;
+    match name {
+        "diffuse" => diffuse(),
+        "plastic" => plastic(false),
+        "plastic_nonlinear" => plastic(true),
+        "twosided_plastic" => twosided(plastic(false)),
+        "roughplastic_ggx_0.3" => roughplastic(0.3, Ggx, false),
+        "roughplastic_ggx_0.1_nonlinear" => roughplastic(0.1, Ggx, true),
+        "roughplastic_ggx_0.01" => roughplastic(0.01, Ggx, false),
+        "roughplastic_beckmann_0.1" => roughplastic(0.1, Beckmann, false),
+        "roughplastic_beckmann_0.5_nonlinear" => roughplastic(0.5, Beckmann, true),
+        "roughconductor_ggx_0.1" => roughconductor([0.1, 0.1], Ggx, grey(1.0)),
+        "roughconductor_ggx_anisotropic" => anisotropic(),
+        "roughconductor_beckmann_0.4" => roughconductor([0.4, 0.4], Beckmann, PINK),
+        "roughdielectric_ggx_0.2" => roughdielectric(0.2, Ggx, grey(1.0)),
+        "roughdielectric_beckmann_0.3" => roughdielectric(0.3, Beckmann, PINK),
+        "blend" => Bsdf::Blend(Blend { weight: grey(0.3), a: Box::new(diffuse()), b: Box::new(anisotropic()) }),
+        "bumpmap_diffuse" => bump(bitmap(0.0, Wrap::Repeat, Affine2::IDENTITY), 0.4, diffuse()),
+        "bumpmap_rough" => bump(bitmap(0.0, Wrap::Mirror, Affine2::IDENTITY), 0.1, model("roughconductor_ggx_0.1")),
+        "bumpmap_turned" => {
+            let to_uv = Affine2::from_angle(20f32.to_radians()) * Affine2::from_scale(Vec2::new(0.6, 0.4));
+            bump(bitmap(0.0, Wrap::Clamp, to_uv), 0.2, twosided(diffuse()))
+        }
+        "normalmap_diffuse" => normal(bitmap(0.3, Wrap::Repeat, Affine2::IDENTITY), diffuse()),
+        "normalmap_anisotropic" => normal(bitmap(0.3, Wrap::Repeat, Affine2::IDENTITY), anisotropic()),
+        "principled_default" => principled(defaults()),
+        "principled_cloth" => principled(PrincipledParams {
+            roughness: grey(0.7),
+            sheen: grey(0.8),
+            sheen_tint: grey(0.6),
+            flatness: grey(0.5),
+            ..defaults()
+        }),
+        "principled_metal" => principled(PrincipledParams {
+            roughness: grey(0.4),
+            metallic: grey(0.7),
+            anisotropic: grey(0.8),
+            spec_tint: grey(0.5),
+            ..defaults()
+        }),
+        "principled_coat" => principled(PrincipledParams {
+            roughness: grey(0.6),
+            clearcoat: grey(0.9),
+            clearcoat_gloss: grey(0.3),
+            eta: Principled::eta_from_specular(0.8),
+            ..defaults()
+        }),
+        "principled_glass" => principled(PrincipledParams {
+            roughness: grey(0.5),
+            spec_trans: grey(0.6),
+            eta: 1.4,
+            spec_tint: grey(0.3),
+            metallic: grey(0.2),
+            ..defaults()
+        }),
+        "conductor" => Bsdf::Conductor(metal(PINK)),
+        "conductor_none" => Bsdf::Conductor(Conductor { eta: Rgb::ZERO, k: Rgb::ZERO, specular_reflectance: grey(1.0) }),
+        "dielectric" => Bsdf::Dielectric(Box::new(Dielectric::new(glass(PINK)).unwrap())),
+        "thindielectric" => Bsdf::ThinDielectric(Box::new(ThinDielectric::new(glass(PINK)).unwrap())),
+        _ => panic!("unknown model {name}"),
+    }
+}
+
+/// Largest relative difference; values below 1e-4 count as that.
+fn differences(ours: &[f32], theirs: &[f32]) -> f32 {
+    let relative = |(a, b): (&f32, &f32)| (a - b).abs() / b.abs().max(a.abs()).max(1e-4);
+    ours.iter().zip(theirs).map(relative).fold(0.0, f32::max)
+}
+
+/// Rounding, except that Mitsuba integrates the tables of `roughplastic` with few nodes (worst for smooth coatings at
+/// grazing angles), and takes the tangent of a map's tilt from 1 - cos², which cancels.
+fn tolerance(model: &str) -> f32 {
+    match model.split('_').next() {
+        Some("roughplastic") => 1.5e-2,
+        Some("bumpmap" | "normalmap") => 5e-4,
+        _ => 1e-5,
+    }
+}
+
+#[test]
+fn values_and_densities_are_mitsubas() {
+    let reference = reference();
+    let mut failures = Vec::new();
+    for case in &reference.cases {
+        if case.model.starts_with("normalmap") {
+            continue;
+        }
+        let (bsdf, s) = (model(&case.model), surface(case.uv));
+        let pairs = reference.wi.iter().flat_map(|wi| reference.wo.iter().map(move |wo| (wi, wo)));
+        let mut worst: (f32, String) = (0.0, String::new());
+        for ((wi, wo), row) in pairs.zip(&case.rows) {
+            let (wi, wo) = (Vec3::from(*wi), Vec3::from(*wo));
+            let eval = |lobes| bsdf.eval(&s, wi, wo, Query { lobes, ..Query::default() }).to_array();
+            let mut ours =
+                if case.split { [eval(Lobes::DIFFUSE), eval(Lobes::NON_DIFFUSE)].concat() } else { eval(Lobes::ALL).to_vec() };
+            ours.push(bsdf.pdf(&s, wi, wo, Query::default()));
+            let difference = differences(&ours, row);
+            if difference > worst.0 || difference.is_nan() {
+                worst = (difference, format!("wi {wi} wo {wo}: ours {ours:?}, Mitsuba's {row:?}"));
+            }
+        }
+        println!("{} {:?}: {:.2e}", case.model, case.uv, worst.0);
+        if !(worst.0 <= tolerance(&case.model)) {
+            failures.push(format!("{} at {:?}: {:.2e}, {}", case.model, case.uv, worst.0, worst.1));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    assert!(reference.cases.len() > 20);
+}
+
+#[test]
+fn delta_samples_are_mitsubas() {
+    for case in reference().samples {
+        let (bsdf, s) = (model(&case.model), surface([0.3, 0.6]));
+        let ours = bsdf.sample(&s, case.wi.into(), case.u, Vec2::new(0.3, 0.8), Query::default());
+        let name = format!("{} wi {:?} u {}", case.model, case.wi, case.u);
+        match (ours, case.sample) {
+            (None, None) => {}
+            (Some(b), Some(theirs)) => {
+                let ours = [b.wo.to_array().as_slice(), &b.weight.to_array(), &[b.pdf, b.eta]].concat();
+                assert!(b.delta && differences(&ours, &theirs) < 1e-4, "{name}: ours {ours:?}, Mitsuba's {theirs:?}");
+            }
+            (ours, theirs) => panic!("{name}: ours {ours:?}, Mitsuba's {theirs:?}"),
+        }
+    }
+}
