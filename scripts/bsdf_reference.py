@@ -163,10 +163,10 @@ def main():
                         parts = [DIFFUSE, NON_DIFFUSE] if split else [ALL]
                         row = [x for mask in parts for x in bsdf.eval(context(mask), si, w)]
                         pdf = bsdf.pdf(context(ALL), si, w)
-                    # From behind an opaque principled, pdf is not what sample does: it draws nothing.
-                    if not split and wi[2] < 0 and max(row) == 0:
-                        pdf = 0.0
-                    rows.append(rounded(row + [pdf]))
+                        # From behind an opaque principled, pdf is not what sample does: it draws nothing.
+                        if not split and wi[2] < 0 and max(row) == 0:
+                            pdf = 0.0
+                        rows.append(rounded(row + [pdf]))
                 cases.append({"model": name, "uv": uv, "split": split, "rows": rows})
     samples = []
     for name, scene in DELTA.items():

@@ -195,13 +195,13 @@ fn differences(ours: &[f32], theirs: &[f32]) -> f32 {
     ours.iter().zip(theirs).map(relative).fold(0.0, f32::max)
 }
 
-/// Rounding, except that Mitsuba integrates the tables of `roughplastic` with few nodes (worst for smooth coatings at
+/// Rounding (of half vectors between grazing directions above all), except that Mitsuba integrates the tables of `roughplastic` with few nodes (worst for smooth coatings at
 /// grazing angles), and takes the tangent of a map's tilt from 1 - cos², which cancels.
 fn tolerance(model: &str) -> f32 {
     match model.split('_').next() {
-        Some("roughplastic") => 1.5e-2,
+        Some("roughplastic") => 5e-3,
         Some("bumpmap" | "normalmap") => 5e-4,
-        _ => 1e-5,
+        _ => 3e-5,
     }
 }
 
@@ -214,6 +214,7 @@ fn values_and_densities_are_mitsubas() {
             continue;
         }
         let (bsdf, s) = (model(&case.model), surface(case.uv));
+        assert_eq!(case.rows.len(), reference.wi.len() * reference.wo.len());
         let pairs = reference.wi.iter().flat_map(|wi| reference.wo.iter().map(move |wo| (wi, wo)));
         let mut worst: (f32, String) = (0.0, String::new());
         for ((wi, wo), row) in pairs.zip(&case.rows) {
@@ -228,7 +229,7 @@ fn values_and_densities_are_mitsubas() {
             }
         }
         println!("{} {:?}: {:.2e}", case.model, case.uv, worst.0);
-        if !(worst.0 <= tolerance(&case.model)) {
+        if worst.0.is_nan() || worst.0 > tolerance(&case.model) {
             failures.push(format!("{} at {:?}: {:.2e}, {}", case.model, case.uv, worst.0, worst.1));
         }
     }

@@ -125,12 +125,12 @@ fn beckmann_slope(tan: f32, u: f32) -> f32 {
     let b_max = erf(x_max).min(1.0 - 1e-6);
     let target = u.clamp(1e-6, 1.0 - 1e-6) * (1.0 + erf(x_max) + FRAC_1_SQRT_PI * tan * (-x_max * x_max).exp());
     let (mut low, mut high) = (-1.0 + 1e-6, b_max);
-    // Exact at normal incidence in the first factor, near the mark at grazing in the second.
-    let mut b = (low + (high - low) * u.powf(1.0 / (1.0 + 0.5 * tan.min(1.0)))).clamp(low, high);
+    // Exact at grazing angles (Jakob's guess).
+    let mut b = (b_max - (1.0 + b_max) * erf((-u.max(1e-6).ln()).max(0.0).sqrt())).clamp(low, high);
     for _ in 0..12 {
         let x = erf_inv(b);
         let error = cdf(b, x) - target;
-        if error.abs() < 1e-6 * target {
+        if error.abs() < 1e-6 {
             break;
         }
         if error > 0.0 {
@@ -182,7 +182,7 @@ fn erf_inv(y: f32) -> f32 {
                 5.739_507_7e-3,
                 -7.622_461_3e-3,
                 9.438_870_5e-3,
-                1.001_674_1,
+                1.001_674,
                 2.832_976_8,
             ],
         )

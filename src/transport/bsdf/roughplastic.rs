@@ -4,7 +4,7 @@
 //! share of the base's own light that the coating throws back. Both belong to the material's alpha;
 //! [`Query::roughness_scale`] changes the specular lobe alone.
 
-use super::albedo::{lobe_albedo, reflected_mean, transmitted_mean};
+use super::albedo::{gauss_legendre, lobe_albedo, reflected_mean, transmitted_mean};
 use super::microfacet::{ALPHA_MIN, Distribution, Microfacets};
 use super::plastic::PlasticParams;
 use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
@@ -15,9 +15,9 @@ use glam::{Vec2, Vec3};
 
 /// Cosines at which the transmittance is tabulated, evenly from 0 to 1 (Mitsuba's count; it shows at grazing angles).
 const COSINES: usize = 64;
-/// Sides of the grids of samples behind an entry; internal reflection has a kink at the critical angle.
-const EXTERNAL_SAMPLES: usize = 32;
-const INTERNAL_SAMPLES: usize = 48;
+/// Nodes of the quadrature behind an entry, each way; internal reflection has a kink at the critical angle.
+const EXTERNAL_NODES: usize = 32;
+const INTERNAL_NODES: usize = 48;
 
 /// The model, with its tables of transmittance.
 #[derive(Debug, Clone)]
@@ -45,11 +45,12 @@ impl RoughPlastic {
         let alpha = alpha.max(ALPHA_MIN);
         let facets = Microfacets::new(distribution, Vec2::splat(alpha));
         let cosine = |i: usize| (i as f32 / (COSINES - 1) as f32).max(1e-6);
-        let transmittance: [f32; COSINES] = std::array::from_fn(|i| transmitted_mean(&facets, cosine(i), EXTERNAL_SAMPLES, eta));
+        let (external, internal) = (gauss_legendre(EXTERNAL_NODES), gauss_legendre(INTERNAL_NODES));
+        let transmittance: [f32; COSINES] = std::array::from_fn(|i| transmitted_mean(&facets, cosine(i), &external, eta));
         // Mitsuba's own quadrature over the cosine: the plain mean of the nodes.
         let mean = |f: &dyn Fn(usize) -> f32| (0..COSINES).map(|i| f(i) * cosine(i)).sum::<f32>() * 2.0 / COSINES as f32;
         let internal_reflectance =
-            mean(&|i| reflected_mean(&facets, cosine(i), INTERNAL_SAMPLES, |c| Vec2::X * fresnel::dielectric(c, 1.0 / eta).r).x);
+            mean(&|i| reflected_mean(&facets, cosine(i), &internal, |c| Vec2::X * fresnel::dielectric(c, 1.0 / eta).r).x);
         let mean_transmittance = mean(&|i| transmittance[i]);
         Ok(Self { params, alpha, distribution, eta, transmittance, internal_reflectance, mean_transmittance })
     }
