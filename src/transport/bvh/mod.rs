@@ -6,19 +6,27 @@
 //! Ours: a ray passes a triangle whose material has an opacity where a hash of ray and triangle, uniform in [0, 1), is not
 //! below that opacity. Repeating a ray repeats its answer, and the mean over many rays is the opacity.
 
+mod simd;
 #[cfg(test)]
 mod tests;
+mod traverse;
 mod triangle;
+mod wide;
 
 use super::surface::uv_at;
 use super::{Hit, Ray};
 use crate::math::{hash_words, luminance};
-use crate::scene::Scene;
 use crate::scene::shapes::normals::unit_normal;
+use crate::scene::{Geometry, Scene};
+use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
-use triangle::Shear;
+#[cfg(target_arch = "x86_64")]
+use simd::Avx2;
+use simd::{Portable, Simd};
+use traverse::STACK;
+use wide::Tree;
 
 /// Boxes are larger than their triangles by this much of the scene's largest coordinate: more than what rounding can move a
 /// hit, so that the tree finds whatever testing every triangle would.
@@ -26,11 +34,7 @@ const BOX_MARGIN: f32 = 8.0 * f32::EPSILON;
 
 /// Acceleration structure over the triangles of a scene (all, or the opaque ones only).
 pub struct Bvh {
-    tree: Bvh2,
-    /// Triangle of each primitive of the tree.
-    triangles: Vec<u32>,
-    /// Whether any triangle may let rays pass.
-    masked: bool,
+    tree: Tree,
 }
 
 impl Bvh {
@@ -40,57 +44,81 @@ impl Bvh {
         let count = geometry.triangles.len() as u32;
         let has_area = |t| unit_normal(geometry.corners(t)).is_some();
         let kept: Vec<u32> = (0..count).filter(|&t| keep(t) && has_area(t)).collect();
-        let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
-        let margin = glam::Vec3A::splat(extent * BOX_MARGIN);
-        let boxes: Vec<Aabb> = kept
-            .iter()
-            .map(|&t| Aabb::from_points(&geometry.corners(t).map(|p| p.to_vec3a())))
-            .map(|b| Aabb::new(b.min - margin, b.max + margin))
-            .collect();
-        // obvhs's medium build, spelled out: its own function checks the tree for seconds in builds with debug assertions.
-        let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-            PlocSearchDistance::Medium,
-            &boxes,
-            (0..boxes.len() as u32).collect(),
-            SortPrecision::U64,
-            3,
-        );
-        let mut optimizer = ReinsertionOptimizer::default();
-        optimizer.run(&mut tree, 0.05, None);
-        collapse(&mut tree, 8, 8.0);
-        optimizer.run(&mut tree, 0.1, None);
-        let triangles = tree.primitive_indices.iter().map(|&i| kept[i as usize]).collect();
-        let masked = scene.materials.iter().any(|m| m.opacity.is_some());
-        Self { tree, triangles, masked }
+        let has_opacity: Vec<bool> = scene.materials.iter().map(|m| m.opacity.is_some()).collect();
+        let masked = |t| has_opacity.get(geometry.object(t).material as usize).copied().unwrap_or(false);
+        Self { tree: Tree::new(&binary_tree(geometry, &kept), &kept, geometry, &masked) }
     }
 
     /// First hit in [t_min, t_max]. Alpha-masked triangles are passed where a hash of ray and triangle says so.
     pub fn closest(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
-        let shear = Shear::new(ray);
-        let mut best: Option<Hit> = None;
-        let mut visit = |i: usize| {
-            let triangle = self.triangles[i];
-            let t_max = best.map_or(ray.t_max, |b| b.t);
-            if let Some((t, u, v)) = shear.intersect(scene.geometry.corners(triangle)) {
-                let nearer = t < t_max || (t == t_max && best.is_none_or(|b| triangle < b.triangle));
-                let hit = Hit { t, triangle, u, v };
-                if t >= ray.t_min && nearer && !(self.masked && passes(scene, ray, &hit)) {
-                    best = Some(hit);
-                }
-            }
-            best.map_or(f32::INFINITY, |b| b.t)
-        };
-        if !self.triangles.is_empty() {
-            let r = obvhs::ray::Ray::new(ray.o.into(), ray.d.into(), ray.t_min, ray.t_max);
-            self.tree.ray_traverse(r, &mut obvhs::ray::RayHit::none(), |_, i| visit(i));
+        let passes = &mut |hit: &Hit| passes(scene, ray, hit);
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx2) = Avx2::detect() {
+            // SAFETY: the machine has AVX2.
+            return unsafe { closest_avx2(avx2, &self.tree, ray, passes) };
         }
-        best
+        closest_with(Portable, &self.tree, ray, passes)
     }
 
     /// Whether anything lies in [t_min, t_max].
     pub fn occluded(&self, scene: &Scene, ray: &Ray) -> bool {
-        self.closest(scene, ray).is_some()
+        let passes = &mut |hit: &Hit| passes(scene, ray, hit);
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx2) = Avx2::detect() {
+            // SAFETY: the machine has AVX2.
+            return unsafe { any_avx2(avx2, &self.tree, ray, passes) };
+        }
+        any_with(Portable, &self.tree, ray, passes)
     }
+}
+
+/// obvhs's medium build, spelled out: its own function checks the tree for seconds in builds with debug assertions.
+fn binary_tree(geometry: &Geometry, kept: &[u32]) -> Bvh2 {
+    let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
+    let margin = Vec3A::splat(extent * BOX_MARGIN);
+    let boxes: Vec<Aabb> = kept
+        .iter()
+        .map(|&t| Aabb::from_points(&geometry.corners(t).map(|p| p.to_vec3a())))
+        .map(|b| Aabb::new(b.min - margin, b.max + margin))
+        .collect();
+    let indices = (0..boxes.len() as u32).collect();
+    let mut tree =
+        PlocBuilder::with_capacity(boxes.len()).build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
+    let mut optimizer = ReinsertionOptimizer::default();
+    optimizer.run(&mut tree, 0.05, None);
+    collapse(&mut tree, 8, 8.0);
+    optimizer.run(&mut tree, 0.1, None);
+    tree
+}
+
+#[inline(always)]
+fn closest_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
+    if tree.stack <= STACK {
+        traverse::closest(s, tree, ray, (&mut [0.0; STACK], &mut [0; STACK]), passes)
+    } else {
+        traverse::closest(s, tree, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
+    }
+}
+
+#[inline(always)]
+fn any_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
+    if tree.stack <= STACK {
+        traverse::any(s, tree, ray, &mut [0; STACK], passes)
+    } else {
+        traverse::any(s, tree, ray, &mut vec![0; tree.stack], passes)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn closest_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
+    closest_with(s, tree, ray, passes)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn any_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
+    any_with(s, tree, ray, passes)
 }
 
 /// Whether `ray` goes through a triangle of partly opaque material.

@@ -62,10 +62,9 @@ fn brute_force(geometry: &Geometry, ray: &Ray) -> Option<Hit> {
         if unit_normal(corners).is_none() {
             continue;
         }
-        if let Some((t, u, v)) = shear.intersect(corners) {
-            if t >= ray.t_min && t <= ray.t_max && best.is_none_or(|b| t < b.t) {
-                best = Some(Hit { t, triangle, u, v });
-            }
+        let found = shear.intersect(corners).filter(|&(t, ..)| t >= ray.t_min && t <= ray.t_max);
+        if let Some((t, u, v)) = found.filter(|&(t, ..)| best.is_none_or(|b| t < b.t)) {
+            best = Some(Hit { t, triangle, u, v });
         }
     }
     best
@@ -88,7 +87,7 @@ fn ray_of(i: u32, geometry: &Geometry, scale: f32, random: &mut Random) -> Ray {
         _ => (o, random.direction()),
     };
     let mut ray = Ray::new(o, d);
-    if i % 3 == 0 {
+    if i.is_multiple_of(3) {
         ray.t_min = 0.2 * scale;
         ray.t_max = 0.9 * scale;
     }
@@ -119,7 +118,7 @@ fn hits_are_those_of_brute_force() {
 fn only_kept_triangles_are_hit() {
     let mut random = Random(2);
     let scene = scene_of(soup(200, &mut random), Mat4::IDENTITY);
-    let bvh = Bvh::build(&scene, &|t| t % 2 == 0);
+    let bvh = Bvh::build(&scene, &|t| t.is_multiple_of(2));
     let mut odd = scene.geometry.clone();
     odd.triangles.iter_mut().skip(1).step_by(2).for_each(|t| *t = [0; 3]);
     for i in 0..2000 {
@@ -194,5 +193,59 @@ fn masks_let_through_what_their_opacity_says() {
         let mean = stopped as f32 / count as f32;
         let sigma = (opacity * (1.0 - opacity) / count as f32).sqrt();
         assert!((mean - opacity).abs() <= 4.0 * sigma, "{mean} of {opacity}, sigma {sigma}");
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn avx2_and_portable_answer_bit_for_bit() {
+    let Some(avx2) = Avx2::detect() else {
+        println!("skipped: no AVX2 here");
+        return;
+    };
+    let mut random = Random(5);
+    let mut scene = scene_of(soup(1200, &mut random), Mat4::IDENTITY);
+    shapes::append(&mut scene.geometry, primitives::sphere(Vec3::X, 0.4), Mat4::IDENTITY, false, false, String::new(), 0, None);
+    let bvh = Bvh::build(&scene, &|_| true);
+    let mut hits = 0;
+    for i in 0..6000 {
+        let ray = ray_of(i, &scene.geometry, 1.0, &mut random);
+        // A mask that waves through every third triangle, to see that both are asked about the same ones.
+        let pass = |hit: &Hit| hit.triangle.is_multiple_of(3);
+        // SAFETY: `avx2` was detected.
+        let (a, any_a) =
+            unsafe { (closest_avx2(avx2, &bvh.tree, &ray, &mut |h| pass(h)), any_avx2(avx2, &bvh.tree, &ray, &mut |h| pass(h))) };
+        let b = closest_with(Portable, &bvh.tree, &ray, &mut |h| pass(h));
+        let bits = |h: Option<Hit>| h.map(|h| (h.t.to_bits(), h.triangle, h.u.to_bits(), h.v.to_bits()));
+        assert_eq!(bits(a), bits(b), "ray {i}");
+        assert_eq!(any_a, any_with(Portable, &bvh.tree, &ray, &mut |h| pass(h)));
+        hits += u32::from(a.is_some());
+    }
+    assert!((2000..6000).contains(&hits), "{hits}");
+}
+
+#[test]
+fn deep_trees_fit_their_stack() {
+    // Boxes in boxes, each a little larger than the one before: a tree as deep as it can get.
+    let mut mesh = Mesh::default();
+    for i in 0..120 {
+        let size = 1.1f32.powi(i);
+        mesh.positions.extend([Vec3::new(size, 0.0, 0.0), Vec3::new(0.0, size, 0.0), Vec3::new(0.0, 0.0, size)]);
+        mesh.triangles.push([3 * i as u32, 3 * i as u32 + 1, 3 * i as u32 + 2]);
+    }
+    let scene = scene_of(mesh, Mat4::IDENTITY);
+    let mut bvh = Bvh::build(&scene, &|_| true);
+    assert!(bvh.tree.stack > 60, "{}", bvh.tree.stack);
+    let mut random = Random(6);
+    for _ in 0..2000 {
+        let o = (random.point() + 1.0) * 1.1f32.powf(random.next() * 120.0);
+        let ray = Ray::new(o, random.direction());
+        let expected = brute_force(&scene.geometry, &ray);
+        assert_eq!(bvh.closest(&scene, &ray), expected);
+        // The same on a stack from the heap, as trees too deep for the other get.
+        let needed = std::mem::replace(&mut bvh.tree.stack, STACK + 1);
+        assert_eq!(bvh.closest(&scene, &ray), expected);
+        assert_eq!(bvh.occluded(&scene, &ray), expected.is_some());
+        bvh.tree.stack = needed;
     }
 }

@@ -7,6 +7,7 @@
 //! Ours: the distance is the barycentric mean of the corners' depths, so that it lies between them whatever the scale.
 
 use super::super::Ray;
+#[cfg(test)]
 use glam::Vec3;
 
 /// A ray made ready for triangles.
@@ -37,7 +38,8 @@ impl Shear {
     }
 
     /// Distance along the ray, and barycentric weights of `b` and `c`, where the line of the ray meets the triangle.
-    /// The eight-wide form takes the same steps in the same order.
+    /// The eight-wide form takes the same steps in the same order; this one is its oracle.
+    #[cfg(test)]
     pub fn intersect(&self, corners: [Vec3; 3]) -> Option<(f32, f32, f32)> {
         let [kx, ky, kz] = self.axes;
         let [sx, sy, sz] = self.shear;

@@ -1,0 +1,187 @@
+//! Walks through the eight-wide tree: nearest octant first for the closest hit, in any order for any hit.
+
+use super::simd::Simd;
+use super::triangle::Shear;
+use super::wide::{Block, MARK, Node, Tree};
+use super::{Hit, Ray};
+
+/// Far sides of boxes are moved out by this much against rounding: 3 ulp, what the slab test can lose (Ize 2013).
+const FAR_SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
+
+/// Directions closer to zero than this count as this, so that no slab is 0 times infinity.
+const LEAST_DIRECTION: f32 = 1e-24;
+
+/// Entries of the stack that lives on the machine's: enough for nodes 35 deep.
+pub const STACK: usize = 256;
+
+/// A ray made ready for boxes and triangles.
+struct Prepared<S: Simd> {
+    origin: [S::F; 3],
+    inverse: [S::F; 3],
+    /// Which of `Node::bounds` a ray enters through, for each axis; it leaves through the others.
+    near: [usize; 3],
+    order: S::I,
+    t_min: S::F,
+    shear_origin: [S::F; 3],
+    shear: [S::F; 3],
+    axes: [usize; 3],
+}
+
+impl<S: Simd> Prepared<S> {
+    #[inline(always)]
+    fn new(s: S, ray: &Ray) -> Self {
+        let d = [ray.d.x, ray.d.y, ray.d.z];
+        let negative = d.map(|x| x.is_sign_negative());
+        let inverse = d.map(|x| 1.0 / if x.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(x) } else { x });
+        let shear = Shear::new(ray);
+        Self {
+            origin: [ray.o.x, ray.o.y, ray.o.z].map(|x| s.splat(x)),
+            inverse: inverse.map(|x| s.splat(x)),
+            near: [0, 1, 2].map(|k| if negative[k] { k + 3 } else { k }),
+            order: s.octant_order(u32::from(negative[0]) | u32::from(negative[1]) << 1 | u32::from(negative[2]) << 2),
+            t_min: s.splat(ray.t_min),
+            shear_origin: shear.origin.map(|x| s.splat(x)),
+            shear: shear.shear.map(|x| s.splat(x)),
+            axes: shear.axes,
+        }
+    }
+
+    /// Where the ray enters and leaves each child's box. Rounding aside: boxes are wider than what they hold.
+    #[inline(always)]
+    fn slabs(&self, s: S, node: &Node, t_max: S::F) -> (S::F, S::F) {
+        let side = |k: usize, bounds: &[f32; 8]| s.mul(s.sub(s.load(bounds), self.origin[k]), self.inverse[k]);
+        let near = |k: usize| side(k, &node.bounds[self.near[k]]);
+        let far = |k: usize| side(k, &node.bounds[k + 3 - (self.near[k] - k)]);
+        let enter = s.max(s.max(near(0), near(1)), s.max(near(2), self.t_min));
+        let leave = s.mul(s.min(s.min(far(0), far(1)), far(2)), s.splat(FAR_SLACK));
+        (enter, s.min(leave, t_max))
+    }
+
+    /// [`Shear::intersect`] of eight triangles: a bit for each that is hit within [t_min, t_max]; t, u and v.
+    #[inline(always)]
+    fn block(&self, s: S, block: &Block, t_max: S::F) -> (u32, [S::F; 3]) {
+        let [kx, ky, kz] = self.axes;
+        let [ox, oy, oz] = self.shear_origin;
+        let [sx, sy, sz] = self.shear;
+        let corner = |k: usize| {
+            let z = s.sub(s.load(&block.corners[k][kz]), oz);
+            let x = s.sub(s.sub(s.load(&block.corners[k][kx]), ox), s.mul(sx, z));
+            let y = s.sub(s.sub(s.load(&block.corners[k][ky]), oy), s.mul(sy, z));
+            [x, y, z]
+        };
+        let (a, b, c) = (corner(0), corner(1), corner(2));
+        let u = s.sub(s.mul(c[0], b[1]), s.mul(c[1], b[0]));
+        let v = s.sub(s.mul(a[0], c[1]), s.mul(a[1], c[0]));
+        let w = s.sub(s.mul(b[0], a[1]), s.mul(b[1], a[0]));
+        let zero = s.splat(0.0);
+        let inside = s.le(zero, s.min(u, s.min(v, w))) | s.le(s.max(u, s.max(v, w)), zero);
+        if inside == 0 {
+            return (0, [zero; 3]);
+        }
+        // Where all three are zero, t is NaN and lies in no range.
+        let inv = s.div(s.splat(1.0), s.add(s.add(u, v), w));
+        let (u, v, w) = (s.mul(u, inv), s.mul(v, inv), s.mul(w, inv));
+        let t = s.mul(s.add(s.add(s.mul(u, a[2]), s.mul(v, b[2])), s.mul(w, c[2])), sz);
+        (inside & s.le(self.t_min, t) & s.le(t, t_max), [t, v, w])
+    }
+}
+
+/// The closest hit that `passes` does not wave through. Of two at one distance, the lower index wins.
+#[inline(always)]
+pub fn closest<S: Simd>(
+    s: S,
+    tree: &Tree,
+    ray: &Ray,
+    stack: (&mut [f32], &mut [u32]),
+    passes: &mut dyn FnMut(&Hit) -> bool,
+) -> Option<Hit> {
+    let r = Prepared::new(s, ray);
+    let (entries, ids) = stack;
+    // A triangle so thin that its distance overflows is no hit: hence not infinity.
+    let mut nearest = ray.t_max.min(f32::MAX);
+    let mut best: Option<Hit> = None;
+    entries[0] = ray.t_min;
+    ids[0] = tree.root?;
+    let mut top = 1;
+    while top > 0 {
+        top -= 1;
+        if entries[top] > nearest {
+            continue;
+        }
+        let id = ids[top];
+        if id & MARK == 0 {
+            let node = &tree.nodes[id as usize];
+            let (enter, leave) = r.slabs(s, node, s.splat(nearest));
+            let mask = s.le_permuted(enter, leave, r.order);
+            let pack = s.compress(mask);
+            let children = s.permute_ids(s.permute_ids(s.load_ids(&node.children), r.order), pack);
+            let enter = s.permute(s.permute(enter, r.order), pack);
+            s.store(enter, entries[top..].first_chunk_mut().expect("room for eight"));
+            s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
+            top += mask.count_ones() as usize;
+        } else {
+            let block = &tree.blocks[(id & !MARK) as usize];
+            let (mut mask, found) = r.block(s, block, s.splat(nearest));
+            if mask == 0 {
+                continue;
+            }
+            let [t, u, v] = found.map(|x| lanes(s, x));
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                let hit = Hit { t: t[lane], triangle: block.ids[lane] & !MARK, u: u[lane], v: v[lane] };
+                let wins = hit.t < nearest || hit.t == nearest && best.is_none_or(|b| hit.triangle < b.triangle);
+                if wins && !(block.ids[lane] & MARK != 0 && passes(&hit)) {
+                    nearest = hit.t;
+                    best = Some(hit);
+                }
+            }
+        }
+    }
+    best
+}
+
+/// Whether there is any hit that `passes` does not wave through.
+#[inline(always)]
+pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
+    let r = Prepared::new(s, ray);
+    let t_max = s.splat(ray.t_max.min(f32::MAX));
+    let Some(root) = tree.root else { return false };
+    ids[0] = root;
+    let mut top = 1;
+    while top > 0 {
+        top -= 1;
+        let id = ids[top];
+        if id & MARK == 0 {
+            let node = &tree.nodes[id as usize];
+            let (enter, leave) = r.slabs(s, node, t_max);
+            let mask = s.le(enter, leave);
+            let children = s.permute_ids(s.load_ids(&node.children), s.compress(mask));
+            s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
+            top += mask.count_ones() as usize;
+        } else {
+            let block = &tree.blocks[(id & !MARK) as usize];
+            let (mut mask, found) = r.block(s, block, t_max);
+            if mask == 0 {
+                continue;
+            }
+            let [t, u, v] = found.map(|x| lanes(s, x));
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                let hit = Hit { t: t[lane], triangle: block.ids[lane] & !MARK, u: u[lane], v: v[lane] };
+                if block.ids[lane] & MARK == 0 || !passes(&hit) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+#[inline(always)]
+fn lanes<S: Simd>(s: S, x: S::F) -> [f32; 8] {
+    let mut out = [0.0; 8];
+    s.store(x, &mut out);
+    out
+}
