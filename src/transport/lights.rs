@@ -146,11 +146,11 @@ impl Lights {
 
     /// Density with which [`Lights::sample`] from `p` finds the emitting point `s`.
     pub fn pdf_surface(&self, p: Vec3, s: &Surface) -> f32 {
-        let Some(emitter) = s.emitter else { return 0.0 };
+        let Some(pdf_area) = s.emitter.and_then(|e| self.pdf_area.get(e as usize)) else { return 0.0 };
         let to_light = s.p - p;
         let distance = to_light.length();
         let cos = s.ng.dot(to_light).abs() / distance;
-        if cos > 0.0 { self.choice_pdf() * self.pdf_area[emitter as usize] * distance * distance / cos } else { 0.0 }
+        if cos > 0.0 { self.choice_pdf() * pdf_area * distance * distance / cos } else { 0.0 }
     }
 
     /// Density with which [`Lights::sample`] finds the environment in direction `d`.
@@ -179,7 +179,7 @@ impl Lights {
     }
 
     fn choice_pdf(&self) -> f32 {
-        1.0 / self.lights.len() as f32
+        1.0 / self.lights.len().max(1) as f32
     }
 }
 

@@ -8,8 +8,8 @@
 use crate::math::{hash_words, hash64};
 use glam::Vec2;
 
-/// Sets of four dimensions that are Sobol points; later ones are hashes. Eight path vertices.
-const SOBOL_SETS: u32 = 16;
+/// Sets of four dimensions that are Sobol points; later ones are hashes. Four path vertices.
+const SOBOL_SETS: u32 = 8;
 
 /// The sample dimensions of one path, drawn in order.
 #[derive(Debug, Clone)]
