@@ -217,38 +217,31 @@ impl Vertex<'_> {
         let world = self.world;
         let Some(light) = world.lights.sample(&world.scene, self.surface.p, choice, v) else { return Rgb::ZERO };
         let wo = self.surface.frame.to_local(light.wi);
-        let value = self.eval(wo);
+        let (value, pdf) = self.eval_pdf(wo);
         if value == Rgb::ZERO || light.weight == Rgb::ZERO || world.occluded(&self.shadow_ray(&light)) {
             return Rgb::ZERO;
         }
-        let other = if light.delta { 0.0 } else { self.pdf(wo) };
-        light.weight * value * power_heuristic(light.pdf, other)
+        light.weight * value * power_heuristic(light.pdf, if light.delta { 0.0 } else { pdf })
     }
 
     fn shadow_ray(&self, light: &LightSample) -> Ray {
         if light.distance.is_finite() { self.surface.spawn_to(light.point) } else { self.surface.spawn(light.wi) }
     }
 
-    /// What radiance from the local direction `wo` is multiplied with, cosine included.
-    fn eval(&self, wo: Vec3) -> Rgb {
+    /// What radiance from the local direction `wo` is multiplied with, cosine included, and the density (solid angle) with
+    /// which [`Vertex::sample`] finds it.
+    fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
         match self.measure {
-            Measure::Scattering { wi, query } => self.bsdf().eval(self.surface, wi, wo, query),
-            Measure::Irradiance { side } => {
+            Measure::Scattering { wi, query } => self.bsdf().eval_pdf(self.surface, wi, wo, query),
+            Measure::Irradiance { side } if wo.z * side > 0.0 => {
                 let cos = wo.z * side;
-                if cos > 0.0 { Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * cos) } else { Rgb::ZERO }
+                (Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * cos), cos * FRAC_1_PI)
             }
+            Measure::Irradiance { .. } => (Rgb::ZERO, 0.0),
         }
     }
 
-    /// Density of [`Vertex::sample`], per solid angle.
-    fn pdf(&self, wo: Vec3) -> f32 {
-        match self.measure {
-            Measure::Scattering { wi, query } => self.bsdf().pdf(self.surface, wi, wo, query),
-            Measure::Irradiance { side } => (wo.z * side).max(0.0) * FRAC_1_PI,
-        }
-    }
-
-    /// Draws a local direction; its weight is [`Vertex::eval`] over pdf.
+    /// Draws a local direction; its weight is the value of [`Vertex::eval_pdf`] over the density.
     fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
         match self.measure {
             Measure::Scattering { wi, query } => {
