@@ -9,15 +9,54 @@
 //! length of ∂f⁻¹/∂x and of ∂f⁻¹/∂y, both in lat-long texels of the probe's size per texel, 1 for plain lat-long.
 
 use super::mesh_inverse;
+use super::quasi_harmonic::Solver;
 use crate::io::{ExrImage, Provenance};
 use crate::math::{direction_from_lat_long, lat_long_from_direction};
 use crate::{Error, Result};
 use glam::{IVec2, UVec2, Vec2, Vec3};
 use half::f16;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Smallest derivative that [`ParameterMap::search_scale`] divides by, lat-long texels per texel.
 const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
+
+/// Parameters of the parameterisation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QhmapParams {
+    /// Width and height of the probes, texels. §7: 1024 x 512.
+    pub size: [u32; 2],
+    /// Added to m, in units of its mean: bounds how far directions without need are compressed, and keeps the system
+    /// regular where m is 0. *Ours*.
+    pub epsilon: f32,
+}
+
+impl Default for QhmapParams {
+    fn default() -> Self {
+        Self { size: [1024, 512], epsilon: 0.01 }
+    }
+}
+
+impl QhmapParams {
+    /// Refuses what [`parameter_map`] cannot work with.
+    pub fn validate(&self) -> Result<()> {
+        let [w, h] = self.size;
+        if w < 2 || h < 2 || w > 16384 || h > 16384 {
+            return Err(Error::Request(format!("probes of {w}x{h} texels: expected from 2 to 16384 each way")));
+        }
+        if !(1e-6..=1e3).contains(&self.epsilon) {
+            return Err(Error::Request(format!("epsilon {}: expected 0.000001 to 1000 times the mean of m", self.epsilon)));
+        }
+        Ok(())
+    }
+}
+
+/// The parameterisation for a resolution map `m` of the solver's size, and the epsilon that it took. `params` are valid.
+pub fn parameter_map(solver: &mut Solver, m: &[f32], params: &QhmapParams) -> Result<(ParameterMap, f32)> {
+    let forward = solver.forward_map(m, params.epsilon)?;
+    Ok((ParameterMap::from_forward(solver.mesh(), forward.vertices, params.size), forward.epsilon))
+}
 
 /// The parameterisation of one probe.
 #[derive(Debug, Clone, PartialEq)]
@@ -234,7 +273,6 @@ fn pairs(path: &Path, image: &ExrImage, x: &str, y: &str) -> Result<Vec<Vec2>> {
 mod tests {
     use super::*;
     use crate::math::hash_words;
-    use crate::probe::quasi_harmonic::Solver;
 
     fn random(seed: u32, i: u32) -> f32 {
         hash_words(&[seed, i]) as f32 / u32::MAX as f32

@@ -94,6 +94,11 @@ impl Solver {
         Ok(Self { mesh, unknown, entries, symbolic: CscSymbolicCholesky::factor(pattern), factor: None })
     }
 
+    /// Quads of the mesh in u and v: the resolution map's size.
+    pub fn mesh(&self) -> [u32; 2] {
+        self.mesh
+    }
+
     /// The map for a resolution map `m` ≥ 0, rows from the top; plain lat-long where m is 0 everywhere.
     /// `epsilon` times m's mean is added to m: it bounds how far a texel without need is compressed.
     pub fn forward_map(&mut self, m: &[f32], epsilon: f32) -> Result<ForwardMap> {
