@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use reprobe::probe::qhmap::{ParameterMap, count_flipped};
 use reprobe::probe::quasi_harmonic::Solver;
-use reprobe::probe::resmap::{ResmapParams, ResolutionMap, correlation, resolution_map, size_term};
+use reprobe::probe::resmap::{ResmapParams, ResolutionMap, density_correlation, resolution_map, size_term};
 use reprobe::probe::seen::{Seen, SeenBuffers};
 use std::f32::consts::{PI, TAU};
 
@@ -187,12 +187,6 @@ fn texel_density_follows_m_over_a_room() {
     assert_eq!(count_flipped(map.size, &forward.vertices), 0);
     assert_eq!(forward.epsilon, epsilon);
     let probe = ParameterMap::from_forward(map.size, forward.vertices, [512, 256]);
-    let r = correlation(&probe.log_density(), &log_m(&map.m));
+    let r = density_correlation(&probe.log_density(), &map.m);
     assert!(r >= 0.85, "correlation {r}");
-}
-
-/// ln m, with the smallest m that still counts where there is none.
-fn log_m(m: &[f32]) -> Vec<f32> {
-    let mean = m.iter().sum::<f32>() / m.len() as f32;
-    m.iter().map(|x| x.max(1e-3 * mean).ln()).collect()
 }

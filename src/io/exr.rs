@@ -119,10 +119,16 @@ impl ExrImage {
 
     /// Writes the file in one step.
     pub fn write(&self, path: &Path) -> Result<()> {
-        atomic::write(path, &self.to_bytes(path)?)
+        atomic::write(path, &self.to_bytes(path, e::Compression::ZIP16)?)
     }
 
-    fn to_bytes(&self, path: &Path) -> Result<Vec<u8>> {
+    /// [`ExrImage::write`] without compression: for large maps of floats, which hardly shrink and take longer to compress
+    /// than to compute.
+    pub fn write_uncompressed(&self, path: &Path) -> Result<()> {
+        atomic::write(path, &self.to_bytes(path, e::Compression::Uncompressed)?)
+    }
+
+    fn to_bytes(&self, path: &Path, compression: e::Compression) -> Result<Vec<u8>> {
         let mut list: Vec<_> = self.channels.iter().collect();
         list.sort_by(|a, b| a.0.cmp(&b.0));
         let channels = list
@@ -142,11 +148,7 @@ impl ExrImage {
             let text = serde_json::to_string(p).map_err(|err| Error::input(path, err.to_string()))?;
             attributes.other.insert("provenance".into(), e::AttributeValue::Text(text.as_str().into()));
         }
-        let encoding = e::Encoding {
-            compression: e::Compression::ZIP16,
-            blocks: e::Blocks::ScanLines,
-            line_order: e::LineOrder::Increasing,
-        };
+        let encoding = e::Encoding { compression, blocks: e::Blocks::ScanLines, line_order: e::LineOrder::Increasing };
         let layer = e::Layer::new((self.width, self.height), attributes, encoding, e::AnyChannels::sort(channels));
         let mut bytes = Cursor::new(Vec::new());
         e::Image::from_layer(layer)
@@ -160,6 +162,14 @@ impl ExrImage {
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|err| Error::io(path, err))?;
         Self::from_bytes(path, &bytes)
+    }
+
+    /// The provenance in a file's header, without its pixels; `None` where there is none.
+    pub fn read_provenance(path: &Path) -> Result<Option<Provenance>> {
+        let file = std::fs::File::open(path).map_err(|err| Error::io(path, err))?;
+        let meta = exr::meta::MetaData::read_from_buffered(std::io::BufReader::new(file), true)
+            .map_err(|err| Error::input(path, format!("not a readable EXR file: {err}")))?;
+        meta.headers.first().map_or(Ok(None), |h| provenance(path, &h.own_attributes))
     }
 
     fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
@@ -180,13 +190,7 @@ impl ExrImage {
             .from_buffered(Cursor::new(bytes))
             .map_err(bad)?;
         let layer = image.layer_data;
-        let provenance = match layer.attributes.other.get(&e::Text::from("provenance")) {
-            Some(e::AttributeValue::Text(t)) => Some(
-                serde_json::from_str(&t.to_string())
-                    .map_err(|err| Error::input(path, format!("attribute \"provenance\": {err}")))?,
-            ),
-            _ => None,
-        };
+        let provenance = provenance(path, &layer.attributes)?;
         let channels = layer
             .channel_data
             .list
@@ -201,6 +205,15 @@ impl ExrImage {
             })
             .collect();
         Ok(Self { width: layer.size.0, height: layer.size.1, channels, provenance })
+    }
+}
+
+fn provenance(path: &Path, attributes: &e::LayerAttributes) -> Result<Option<Provenance>> {
+    match attributes.other.get(&e::Text::from("provenance")) {
+        Some(e::AttributeValue::Text(t)) => serde_json::from_str(&t.to_string())
+            .map(Some)
+            .map_err(|err| Error::input(path, format!("attribute \"provenance\": {err}"))),
+        _ => Ok(None),
     }
 }
 
@@ -220,6 +233,9 @@ mod tests {
         image.write(&path).unwrap();
         let back = ExrImage::read(&path).unwrap();
         assert_eq!(back, image);
+        assert_eq!(ExrImage::read_provenance(&path).unwrap(), image.provenance);
+        image.write_uncompressed(&path).unwrap();
+        assert_eq!(ExrImage::read(&path).unwrap(), image);
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file stays behind");
     }
 

@@ -1,6 +1,6 @@
 //! Light probes (§4): where they stand, how their texels are spent, what is baked into them.
 //!
-//! [`placement`] makes the grid; [`seen`] casts the buffers from which [`resmap`], with [`dct`], decides how much resolution
+//! [`placement`] makes the grid where [`reach`] says; [`seen`] casts the buffers from which [`resmap`], with [`dct`], decides how much resolution
 //! each direction deserves; [`quasi_harmonic`] turns that into a deformed lat-long mesh, [`mesh_inverse`] inverts it, and
 //! [`qhmap`] holds both as the probe's parameterisation; [`bake`] fills the texels. [`set`] marks a folder of probe files as complete.
 
@@ -12,6 +12,7 @@ pub mod mesh_inverse;
 pub mod placement;
 pub mod qhmap;
 pub mod quasi_harmonic;
+pub mod reach;
 pub mod resmap;
 pub mod seen;
 pub mod set;

@@ -202,8 +202,8 @@ impl ParameterMap {
     /// Writes probe `index`'s map into a folder: `NNNN.exr` (inverse) after `NNNN_forward.exr`.
     pub fn save(&self, folder: &Path, index: usize, provenance: &Provenance) -> Result<()> {
         let [forward, inverse] = map_paths(folder, index);
-        self.forward_image().with_provenance(provenance.clone()).write(&forward)?;
-        self.inverse_image().with_provenance(provenance.clone()).write(&inverse)
+        self.forward_image().with_provenance(provenance.clone()).write_uncompressed(&forward)?;
+        self.inverse_image().with_provenance(provenance.clone()).write_uncompressed(&inverse)
     }
 
     /// Reads what [`ParameterMap::save`] wrote, and its provenance.

@@ -152,7 +152,7 @@ pub fn read_m(path: &Path, image: &ExrImage) -> Result<([u32; 2], Vec<f32>)> {
 }
 
 /// Pearson's correlation of two equally long series; 0 where either is constant.
-pub fn correlation(a: &[f32], b: &[f32]) -> f64 {
+fn correlation(a: &[f32], b: &[f32]) -> f64 {
     let n = a.len() as f64;
     let mean = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / n;
     let (ma, mb) = (mean(a), mean(b));
@@ -164,4 +164,12 @@ pub fn correlation(a: &[f32], b: &[f32]) -> f64 {
         bb += y * y;
     }
     if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
+}
+
+/// How well log-density follows log m, quad by quad. Where m is next to nothing, a thousandth of its mean counts: the
+/// logarithm of 0 says nothing about resolution.
+pub fn density_correlation(log_density: &[f32], m: &[f32]) -> f64 {
+    let mean = (m.iter().map(|&x| f64::from(x)).sum::<f64>() / m.len() as f64) as f32;
+    let log_m: Vec<f32> = m.iter().map(|x| x.max(1e-3 * mean).max(f32::MIN_POSITIVE).ln()).collect();
+    correlation(log_density, &log_m)
 }

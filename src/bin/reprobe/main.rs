@@ -6,6 +6,7 @@ mod common;
 mod compare;
 mod curvature;
 mod place_probes;
+mod probe_set;
 mod qhmap;
 mod render_path;
 mod resmap;

