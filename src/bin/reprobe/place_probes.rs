@@ -1,7 +1,7 @@
 //! `reprobe place-probes`.
 
 use crate::common::{Common, Outcome};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use glam::Vec3;
 use reprobe::io::Provenance;
 use reprobe::probe::placement::{Density, ProbeGrid};
