@@ -59,7 +59,7 @@ def load(path):
             _vector(path, key, (where, "origin"))
             + _vector(path, key, (where, "target"))
             + _vector(path, key, (where, "up"), [0, 1, 0])
-            + [horizontal_fov(fov, axis, size)]
+            + [fov]
         )
     if "keyframes" in tree and "frames" not in tree and len(flat) > 1:
         times = [float(k["time"]) for k in keys]
@@ -68,7 +68,8 @@ def load(path):
         step = 1.0 / float(tree.get("fps", 30))
         count = int(math.floor((times[-1] - times[0]) / step + 1e-6)) + 1
         flat = [_catmull_rom(times, flat, times[0] + i * step) for i in range(count)]
-    return [{"origin": v[0:3], "target": v[3:6], "up": v[6:9], "fov_x": v[9]} for v in flat], size
+    frames = [{"origin": v[0:3], "target": v[3:6], "up": v[6:9], "fov_x": horizontal_fov(v[9], axis, size)} for v in flat]
+    return frames, size
 
 
 def horizontal_fov(fov, axis, size):

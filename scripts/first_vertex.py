@@ -29,7 +29,8 @@ def integrator(layer, max_depth, rr_depth):
 def power_heuristic(a, b):
     """Weight of a sample of density a, where b is the other strategy's density."""
     a, b = a * a, b * b
-    return dr.select(a + b > 0, a / (a + b), 0.0)
+    weight = a / (a + b)
+    return dr.select(dr.isfinite(weight), weight, 0.0)  # as Mitsuba: both zero, or one past the range of a float
 
 
 class FirstVertex(mi.SamplingIntegrator):

@@ -73,6 +73,7 @@ def load_scene(mi, path):
     mi.file_resolver().prepend(os.path.dirname(os.path.abspath(path)))
     config = mi.parser.ParserConfig(mi.variant())
     config.unused_properties = mi.LogLevel.Warn
+    config.parallel = False  # with few threads, its nested waits can lock up
     try:
         state = mi.parser.parse_file(config, path)
         mi.parser.transform_all(config, state)

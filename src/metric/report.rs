@@ -1,1 +1,1 @@
-//! TODO
+//! `metrics.json` and `index.html`.
