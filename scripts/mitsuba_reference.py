@@ -48,7 +48,7 @@ def find_llvm():
                 return
 
 
-def import_mitsuba(variant, threads=None):
+def import_mitsuba(variant):
     """Mitsuba with its variant set, or a message that says what to install."""
     if variant.startswith("llvm"):
         find_llvm()
@@ -59,8 +59,6 @@ def import_mitsuba(variant, threads=None):
         fail(f"{error}; install it with: pip install mitsuba numpy")
     try:
         mitsuba.set_variant(variant)
-        if threads:
-            drjit.set_thread_count(threads)
         if variant.startswith("llvm"):
             drjit.eval(drjit.arange(mitsuba.Float, 1))
     except Exception as error:
@@ -179,7 +177,6 @@ def parse_arguments():
     parser.add_argument("--frames", help="only these, such as 0,3,5-8")
     parser.add_argument("--max-depth", type=int, help="longest path, -1 for no limit; the scene's own by default")
     parser.add_argument("--variant", default="llvm_ad_rgb")
-    parser.add_argument("--threads", type=int)
     return parser.parse_args()
 
 
@@ -208,7 +205,7 @@ def main():
     if not os.path.isfile(args.scene):
         fail(f"{args.scene}: no such file")
 
-    mi = import_mitsuba(args.variant, args.threads)
+    mi = import_mitsuba(args.variant)
     scene = load_scene(mi, args.scene)
     max_depth, rr_depth = integrator_depth(mi, scene)
     if args.max_depth is not None:

@@ -96,7 +96,9 @@ pub fn compare(image: &Raster, reference: &Raster, exposure: f32) -> Comparison 
     };
     let maps = ErrorMaps {
         difference: a.pixels.iter().zip(&b.pixels).map(|(&x, &y)| (x - y).abs().element_sum() / 3.0).collect(),
-        dssim: (0..flip.len()).map(|i| dssim(similar[..3].iter().map(|s| f64::from(s.map[i])).sum::<f64>() / 3.0) as f32).collect(),
+        dssim: (0..flip.len())
+            .map(|i| dssim(similar[..3].iter().map(|s| f64::from(s.map[i])).sum::<f64>() / 3.0) as f32)
+            .collect(),
         flip,
     };
     Comparison { metrics, maps, display: [a, b] }

@@ -86,7 +86,9 @@ mod tests {
         let expected = 0.876726078;
         assert!((s.mean - expected).abs() < 1e-6, "{} against {expected}", s.mean);
         // Map values, corners included: the borders mirror as theirs do.
-        for (x, y, expected) in [(0, 0, 0.9375613), (23, 16, 0.8466748), (12, 8, 0.8634829), (23, 0, 0.9079100), (5, 5, 0.9340506)] {
+        for (x, y, expected) in
+            [(0, 0, 0.9375613), (23, 16, 0.8466748), (12, 8, 0.8634829), (23, 0, 0.9079100), (5, 5, 0.9340506)]
+        {
             let found = f64::from(s.map[y * 24 + x]);
             assert!((found - expected).abs() < 1e-5, "({x}, {y}): {found} against {expected}");
         }
