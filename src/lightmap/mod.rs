@@ -15,6 +15,8 @@
 pub mod adjacency;
 pub mod atlas;
 pub mod bake;
+#[cfg(test)]
+mod bake_tests;
 pub mod chart;
 pub mod fill;
 pub mod lookup;

@@ -1,0 +1,257 @@
+//! The bake against closed forms, and the three ways in which light maps leak.
+
+use super::bake::{BakeParams, Plan};
+use super::parts::{Memory, Store};
+use super::{AtlasParams, LightMap, lookup, testing};
+use crate::math::Rgb;
+use crate::progress::Silent;
+use crate::scene::{Camera, Emitter, Geometry, Material, Scene, Texture};
+use crate::transport::bsdf::{Bsdf, Conductor, Diffuse, TwoSided};
+use crate::transport::path::{PathParams, transmitted_irradiance};
+use crate::transport::{Ray, Sampler, Surface, World};
+use glam::{Vec2, Vec3};
+use std::f32::consts::PI;
+
+fn diffuse(albedo: f32) -> Material {
+    let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::splat(albedo)) });
+    Material { name: "diffuse".into(), bsdf, opacity: None }
+}
+
+fn two_sided(albedo: f32) -> Material {
+    let bsdf = TwoSided::new(diffuse(albedo).bsdf, diffuse(albedo).bsdf).unwrap();
+    Material { name: "two-sided".into(), bsdf: Bsdf::TwoSided(bsdf), opacity: None }
+}
+
+fn sky(radiance: f32) -> Emitter {
+    Emitter::Constant { radiance: Rgb::splat(radiance) }
+}
+
+fn scene(geometry: Geometry, material: Material, emitters: Vec<Emitter>) -> Scene {
+    Scene { geometry, materials: vec![material], emitters, ..Default::default() }
+}
+
+fn params(texel: f32, spp: u32) -> BakeParams {
+    BakeParams { spp, atlas: AtlasParams { texel: Some(texel), ..Default::default() }, ..Default::default() }
+}
+
+fn bake(world: &World, params: &BakeParams) -> LightMap {
+    let plan = Plan::new(world, params, 1).unwrap();
+    let store = Memory::default();
+    plan.run(&store, &|_| true, &Silent).unwrap();
+    let baked = plan.assemble(&store).unwrap();
+    lookup::sides(&world.scene.geometry, &plan.atlas, baked.front, baked.back)
+}
+
+/// What the map says at the surface below (or above) `p`.
+fn map_at(world: &World, map: &LightMap, p: Vec3, d: Vec3, back: bool) -> f32 {
+    let hit = world.closest(&Ray::new(p, d)).unwrap();
+    map.lookup(hit.triangle, Vec2::new(hit.u, hit.v), back).x
+}
+
+/// The same by path tracing at the very point.
+fn traced_at(world: &World, p: Vec3, d: Vec3, back: bool) -> f32 {
+    let surface = world.intersect(&Ray::new(p, d)).unwrap();
+    let n = 4096;
+    (0..n).map(|i| transmitted_irradiance(world, &surface, back, &PathParams::default(), &mut Sampler::new(9, i)).x).sum::<f32>()
+        / n as f32
+}
+
+#[test]
+fn under_a_uniform_sky_a_convex_body_gets_pi_everywhere() {
+    let mut g = Geometry::default();
+    testing::sphere(&mut g, Vec3::ZERO, 1.0, 16);
+    testing::cuboid(&mut g, Vec3::new(40.0, 0.0, 0.0), Vec3::new(41.0, 1.0, 1.0));
+    let world = World::new(scene(g, two_sided(0.5), vec![sky(1.0)]));
+    let map = bake(&world, &params(0.1, 64));
+    assert!(map.back.is_none(), "nobody sees the inside of closed bodies");
+    for t in 0..world.scene.geometry.triangles.len() as u32 {
+        for b in [Vec2::new(0.1, 0.1), Vec2::new(0.9, 0.05), Vec2::new(0.3, 0.4)] {
+            let e = map.lookup(t, b, false).x;
+            // The two bodies reflect a little light on each other.
+            assert!((e / PI - 1.0).abs() < 0.01, "triangle {t}: {e}");
+        }
+    }
+}
+
+/// Irradiance at `p` with normal `n` from a Lambertian polygon of unit radiance (Lambert 1760); no horizon clipping.
+fn lambert(p: Vec3, n: Vec3, polygon: &[Vec3]) -> f32 {
+    let v: Vec<Vec3> = polygon.iter().map(|q| (*q - p).normalize()).collect();
+    let edges = (0..v.len()).map(|i| {
+        let (a, b) = (v[i], v[(i + 1) % v.len()]);
+        a.angle_between(b) * n.dot(a.cross(b).normalize())
+    });
+    (0.5 * edges.sum::<f32>()).abs()
+}
+
+#[test]
+fn texels_under_a_rectangle_light_hold_its_form_factor() {
+    let mut g = Geometry::default();
+    testing::quad(&mut g, Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+    let corner = Vec3::new(-0.3, 0.8, -0.2);
+    testing::quad(&mut g, corner, Vec3::X * 0.5, Vec3::Z * 0.7);
+    g.objects[1].emitter = Some(0);
+    let light = Emitter::Area { object: 1, radiance: Texture::Constant(Rgb::splat(3.0)) };
+    let world = World::new(scene(g, diffuse(0.0), vec![light]));
+    let map = bake(&world, &params(0.1, 256));
+    let polygon = [corner, corner + Vec3::X * 0.5, corner + Vec3::new(0.5, 0.0, 0.7), corner + Vec3::Z * 0.7];
+    let (mut mean, mut worst, mut count) = (0.0, 0f32, 0);
+    for i in 0..20 {
+        for j in 0..20 {
+            let p = Vec3::new(-0.95 + 0.1 * i as f32, 0.0, -0.95 + 0.1 * j as f32);
+            let exact = 3.0 * lambert(p, Vec3::Y, &polygon);
+            let error = map_at(&world, &map, p + Vec3::Y * 0.1, Vec3::NEG_Y, false) / exact - 1.0;
+            mean += error;
+            worst = worst.max(error.abs());
+            count += 1;
+        }
+    }
+    mean /= count as f32;
+    // The mean over a texel is not the value at its centre: curvature of E adds some 0.1 %.
+    assert!(mean.abs() < 3e-3, "mean relative error {mean}");
+    assert!(worst < 0.03, "worst relative error {worst}");
+}
+
+/// A floor of one chart with a black box on it, whose sides cross texels at 0.3 of their width.
+fn box_on_floor(bottom: f32) -> World {
+    let mut g = Geometry::default();
+    testing::quad(&mut g, Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+    testing::cuboid(&mut g, Vec3::new(-0.37, bottom, -0.37), Vec3::new(0.43, 3.0, 0.43));
+    World::new(scene(g, diffuse(0.0), vec![sky(1.0)]))
+}
+
+#[test]
+fn no_darkness_leaks_from_under_a_box() {
+    // Sunk into the floor, flush with it, and just above.
+    for bottom in [-0.05, 0.0, 0.002] {
+        let world = box_on_floor(bottom);
+        let map = bake(&world, &params(0.1, 256));
+        for i in 0..12 {
+            let z = -0.3 + 0.06 * i as f32;
+            for x in [-0.375, -0.39, 0.435, 0.45] {
+                let p = Vec3::new(x, 0.02, z);
+                let (found, exact) = (map_at(&world, &map, p, Vec3::NEG_Y, false), traced_at(&world, p, Vec3::NEG_Y, false));
+                // E is some π/2 here and grows away from the box: half a texel off is 5 %.
+                assert!((found / exact - 1.0).abs() < 0.07, "bottom {bottom}, {p}: {found}, expected {exact}");
+            }
+        }
+    }
+}
+
+#[test]
+fn without_the_visibility_tests_the_box_would_leak() {
+    // What the plain mean over the texel that the box's side crosses would be: 0.3 of it is lit.
+    let world = box_on_floor(-0.05);
+    let surface = |x: f32| world.intersect(&Ray::new(Vec3::new(x, 0.02, 0.1), Vec3::NEG_Y)).unwrap();
+    let light = |s: &Surface| {
+        (0..256).map(|i| transmitted_irradiance(&world, s, false, &PathParams::default(), &mut Sampler::new(3, i)).x).sum::<f32>() / 256.0
+    };
+    let plain = (0..10).map(|i| light(&surface(0.405 + 0.01 * i as f32))).sum::<f32>() / 10.0;
+    let map = bake(&world, &params(0.1, 256));
+    assert!(map_at(&world, &map, Vec3::new(0.45, 0.02, 0.1), Vec3::NEG_Y, false) > 1.2 * plain);
+}
+
+/// A lit room of single sheets whose floor goes on beyond the wall at x = 1.03; `outside` is the light there.
+fn room_with_a_floor_that_goes_on(outside: Option<f32>) -> World {
+    let mut g = Geometry::default();
+    let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
+    testing::quad(&mut g, Vec3::new(-1.0, 0.0, -1.0), z * 2.0, x * 4.0);
+    testing::quad(&mut g, Vec3::new(1.03, 0.0, -1.0), z * 2.0, y * 2.0);
+    testing::quad(&mut g, Vec3::new(-1.0, 0.0, -1.0), y * 2.0, z * 2.0);
+    testing::quad(&mut g, Vec3::new(-1.0, 0.0, -1.0), x * 4.0, y * 2.0);
+    testing::quad(&mut g, Vec3::new(-1.0, 0.0, 1.0), y * 2.0, x * 4.0);
+    testing::quad(&mut g, Vec3::new(-1.0, 2.0, -1.0), x * 2.03, z * 2.0);
+    let mut emitters = vec![];
+    let mut lamp = |g: &mut Geometry, x0: f32, radiance: f32, height: f32| {
+        testing::quad(g, Vec3::new(x0, height, -0.3), x * 0.6, z * 0.6);
+        let object = g.objects.len() as u32 - 1;
+        g.objects[object as usize].emitter = Some(emitters.len() as u32);
+        emitters.push(Emitter::Area { object, radiance: Texture::Constant(Rgb::splat(radiance)) });
+    };
+    lamp(&mut g, -0.3, 5.0, 1.9);
+    match outside {
+        Some(radiance) => lamp(&mut g, 1.7, radiance, 1.0),
+        // Dark: shut off from the lamp's light by the wall and a lid.
+        None => testing::quad(&mut g, Vec3::new(1.03, 2.0, -1.0), x * 2.0, z * 2.0),
+    }
+    let sensor = Some(Camera::look_at(Vec3::new(-0.8, 1.0, 0.0), x, y, 1.0, [4, 4]));
+    World::new(Scene { sensor, ..scene(g, two_sided(0.5), emitters) })
+}
+
+#[test]
+fn neither_a_dark_void_nor_a_bright_yard_leaks_under_a_wall() {
+    for (outside, tolerance) in [(None, 0.06), (Some(100.0), 0.06)] {
+        let world = room_with_a_floor_that_goes_on(outside);
+        // Texel borders lie at multiples of 0.1: the texel of the wall is lit for three tenths.
+        let map = bake(&world, &params(0.1, 256));
+        for i in 0..10 {
+            let p = Vec3::new(1.005, 0.1, -0.9 + 0.2 * i as f32);
+            let (found, exact) = (map_at(&world, &map, p, Vec3::NEG_Y, false), traced_at(&world, p, Vec3::NEG_Y, false));
+            assert!((found / exact - 1.0).abs() < tolerance, "outside {outside:?}, {p}: {found}, expected {exact}");
+        }
+    }
+}
+
+#[test]
+fn both_sides_of_a_sheet_keep_their_own_light() {
+    let mut g = Geometry::default();
+    testing::quad(&mut g, Vec3::ZERO, Vec3::Z, Vec3::X);
+    let sun = |y: f32, irradiance: f32| Emitter::Directional { direction: Vec3::Y * y, irradiance: Rgb::splat(irradiance) };
+    let world = World::new(scene(g.clone(), two_sided(0.5), vec![sun(-1.0, 2.0), sun(1.0, 0.5)]));
+    let map = bake(&world, &params(0.2, 16));
+    assert!((map_at(&world, &map, Vec3::new(0.3, 1.0, 0.6), Vec3::NEG_Y, false) - 2.0).abs() < 1e-3);
+    assert!((map_at(&world, &map, Vec3::new(0.3, -1.0, 0.6), Vec3::Y, true) - 0.5).abs() < 1e-3);
+    // Without light behind, or with a one-sided material, there is no back at all.
+    assert!(bake(&World::new(scene(g.clone(), two_sided(0.5), vec![sun(-1.0, 2.0)])), &params(0.2, 16)).back.is_none());
+    assert!(bake(&World::new(scene(g, diffuse(0.5), vec![sun(1.0, 2.0)])), &params(0.2, 16)).back.is_none());
+}
+
+#[test]
+fn mirrors_get_no_texels() {
+    let mut g = Geometry::default();
+    testing::quad(&mut g, Vec3::ZERO, Vec3::Z, Vec3::X);
+    let (eta, k) = (Rgb::ZERO, Rgb::ONE);
+    let bsdf = Bsdf::Conductor(Conductor { eta, k, specular_reflectance: Texture::Constant(Rgb::ONE) });
+    let mirror = Material { name: "mirror".into(), bsdf, opacity: None };
+    let world = World::new(scene(g, mirror, vec![sky(1.0)]));
+    let plan = Plan::new(&world, &params(0.1, 4), 0).unwrap();
+    assert!(plan.is_empty());
+    assert_eq!(bake(&world, &params(0.1, 4)).lookup(0, Vec2::ZERO, false), Rgb::ZERO);
+}
+
+#[test]
+fn a_scene_without_surfaces_or_light_gives_an_empty_or_black_map() {
+    let empty = World::new(scene(Geometry::default(), diffuse(0.5), vec![]));
+    assert_eq!(bake(&empty, &params(0.1, 4)).lookup(0, Vec2::ZERO, false), Rgb::ZERO);
+    let mut g = Geometry::default();
+    testing::quad(&mut g, Vec3::ZERO, Vec3::Z, Vec3::X);
+    // A zero-area object beside it.
+    testing::quad(&mut g, Vec3::ONE, Vec3::ZERO, Vec3::ZERO);
+    let dark = World::new(scene(g, diffuse(0.5), vec![]));
+    assert_eq!(bake(&dark, &params(0.1, 4)).lookup(0, Vec2::splat(0.3), false), Rgb::ZERO);
+    assert!(Plan::new(&dark, &params(0.1, 0), 0).is_err());
+}
+
+#[test]
+fn shards_and_threads_and_taking_up_a_killed_bake_change_no_bit() {
+    let world = box_on_floor(0.0);
+    let params = params(0.02, 2);
+    let plan = Plan::new(&world, &params, 7).unwrap();
+    assert!(plan.blocks() >= 3, "{} blocks", plan.blocks());
+    let whole = Memory::default();
+    plan.run(&whole, &|_| true, &Silent).unwrap();
+    let expected = plan.assemble(&whole).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let parts = Memory::default();
+    pool.install(|| {
+        let plan = Plan::new(&world, &params, 7).unwrap();
+        assert!(plan.assemble(&parts).is_err(), "blocks are missing");
+        assert_eq!(plan.run(&parts, &|b| b % 2 == 1, &Silent).unwrap(), 0);
+        assert_eq!(plan.run(&parts, &|_| true, &Silent).unwrap(), plan.blocks() / 2, "finished blocks are kept");
+        assert_eq!(plan.assemble(&parts).unwrap(), expected);
+    });
+    assert!(parts.get(0, 1).is_none());
+    let other = Plan::new(&world, &params, 8).unwrap();
+    let store = Memory::default();
+    other.run(&store, &|_| true, &Silent).unwrap();
+    assert_ne!(other.assemble(&store).unwrap(), expected, "the seed counts");
+}
