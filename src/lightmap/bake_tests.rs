@@ -51,7 +51,7 @@ fn map_at(world: &World, map: &LightMap, p: Vec3, d: Vec3, back: bool) -> f32 {
 /// The same by path tracing at the very point.
 fn traced_at(world: &World, p: Vec3, d: Vec3, back: bool) -> f32 {
     let surface = world.intersect(&Ray::new(p, d)).unwrap();
-    let n = 4096;
+    let n = 2048;
     (0..n).map(|i| transmitted_irradiance(world, &surface, back, &PathParams::default(), &mut Sampler::new(9, i)).x).sum::<f32>()
         / n as f32
 }
@@ -59,18 +59,24 @@ fn traced_at(world: &World, p: Vec3, d: Vec3, back: bool) -> f32 {
 #[test]
 fn under_a_uniform_sky_a_convex_body_gets_pi_everywhere() {
     let mut g = Geometry::default();
-    testing::sphere(&mut g, Vec3::ZERO, 1.0, 16);
+    // Fine enough that shading normals and facets agree about the horizon.
+    testing::sphere(&mut g, Vec3::ZERO, 1.0, 32);
     testing::cuboid(&mut g, Vec3::new(40.0, 0.0, 0.0), Vec3::new(41.0, 1.0, 1.0));
     let world = World::new(scene(g, two_sided(0.5), vec![sky(1.0)]));
     let map = bake(&world, &params(0.1, 64));
     assert!(map.back.is_none(), "nobody sees the inside of closed bodies");
+    let (mut mean, mut count) = (0.0, 0);
     for t in 0..world.scene.geometry.triangles.len() as u32 {
         for b in [Vec2::new(0.1, 0.1), Vec2::new(0.9, 0.05), Vec2::new(0.3, 0.4)] {
-            let e = map.lookup(t, b, false).x;
-            // The two bodies reflect a little light on each other.
-            assert!((e / PI - 1.0).abs() < 0.01, "triangle {t}: {e}");
+            let error = map.lookup(t, b, false).x / PI - 1.0;
+            // 64 samples of one emitter and one cosine direction each: a standard deviation of some 1 %.
+            assert!(error.abs() < 0.05, "triangle {t}: {error}");
+            mean += error;
+            count += 1;
         }
     }
+    mean /= count as f32;
+    assert!(mean.abs() < 1e-3, "{mean}");
 }
 
 /// Irradiance at `p` with normal `n` from a Lambertian polygon of unit radiance (Lambert 1760); no horizon clipping.
@@ -125,13 +131,13 @@ fn no_darkness_leaks_from_under_a_box() {
     for bottom in [-0.05, 0.0, 0.002] {
         let world = box_on_floor(bottom);
         let map = bake(&world, &params(0.1, 256));
-        for i in 0..12 {
-            let z = -0.3 + 0.06 * i as f32;
+        for i in 0..6 {
+            let z = -0.2 + 0.08 * i as f32;
             for x in [-0.375, -0.39, 0.435, 0.45] {
                 let p = Vec3::new(x, 0.02, z);
                 let (found, exact) = (map_at(&world, &map, p, Vec3::NEG_Y, false), traced_at(&world, p, Vec3::NEG_Y, false));
-                // E is some π/2 here and grows away from the box: half a texel off is 5 %.
-                assert!((found / exact - 1.0).abs() < 0.07, "bottom {bottom}, {p}: {found}, expected {exact}");
+                // E is some π/2 here and grows away from the box by half that a texel: interpolation blurs up, leaks pull down.
+                assert!((0.97..1.12).contains(&(found / exact)), "bottom {bottom}, {p}: {found}, expected {exact}");
             }
         }
     }
@@ -143,7 +149,8 @@ fn without_the_visibility_tests_the_box_would_leak() {
     let world = box_on_floor(-0.05);
     let surface = |x: f32| world.intersect(&Ray::new(Vec3::new(x, 0.02, 0.1), Vec3::NEG_Y)).unwrap();
     let light = |s: &Surface| {
-        (0..256).map(|i| transmitted_irradiance(&world, s, false, &PathParams::default(), &mut Sampler::new(3, i)).x).sum::<f32>() / 256.0
+        (0..256).map(|i| transmitted_irradiance(&world, s, false, &PathParams::default(), &mut Sampler::new(3, i)).x).sum::<f32>()
+            / 256.0
     };
     let plain = (0..10).map(|i| light(&surface(0.405 + 0.01 * i as f32))).sum::<f32>() / 10.0;
     let map = bake(&world, &params(0.1, 256));
@@ -174,20 +181,24 @@ fn room_with_a_floor_that_goes_on(outside: Option<f32>) -> World {
         None => testing::quad(&mut g, Vec3::new(1.03, 2.0, -1.0), x * 2.0, z * 2.0),
     }
     let sensor = Some(Camera::look_at(Vec3::new(-0.8, 1.0, 0.0), x, y, 1.0, [4, 4]));
-    World::new(Scene { sensor, ..scene(g, two_sided(0.5), emitters) })
+    World::new(Scene { sensor, ..scene(g, two_sided(0.2), emitters) })
 }
 
 #[test]
 fn neither_a_dark_void_nor_a_bright_yard_leaks_under_a_wall() {
-    for (outside, tolerance) in [(None, 0.06), (Some(100.0), 0.06)] {
+    for outside in [None, Some(100.0)] {
         let world = room_with_a_floor_that_goes_on(outside);
         // Texel borders lie at multiples of 0.1: the texel of the wall is lit for three tenths.
-        let map = bake(&world, &params(0.1, 256));
+        let map = bake(&world, &params(0.1, 64));
+        let (mut found, mut exact) = (0.0, 0.0);
         for i in 0..10 {
             let p = Vec3::new(1.005, 0.1, -0.9 + 0.2 * i as f32);
-            let (found, exact) = (map_at(&world, &map, p, Vec3::NEG_Y, false), traced_at(&world, p, Vec3::NEG_Y, false));
-            assert!((found / exact - 1.0).abs() < tolerance, "outside {outside:?}, {p}: {found}, expected {exact}");
+            let here = (map_at(&world, &map, p, Vec3::NEG_Y, false), traced_at(&world, p, Vec3::NEG_Y, false));
+            // Most emitter samples go to the brighter lamp in the yard, so a single texel is noisy.
+            assert!((here.0 / here.1 - 1.0).abs() < 0.25, "outside {outside:?}, {p}: {}, expected {}", here.0, here.1);
+            (found, exact) = (found + here.0, exact + here.1);
         }
+        assert!((found / exact - 1.0).abs() < 0.06, "outside {outside:?}: {found}, expected {exact}");
     }
 }
 
