@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod exr;
+pub mod picture;
 pub mod provenance;
 
 pub use exr::{ExrImage, Samples};

@@ -1,1 +1,337 @@
-//! TODO
+//! Gathering view-dependent colour from the probes around the camera (§5.2).
+//!
+//! For each glossy pixel and each of the eight nearest probes: estimate where on the reflector the probe sees the same reflected
+//! point (§5.1), search the probe's texels around it for the one with least energy (Eq. 1), and blend the eight colours (Eq. 2).
+//!
+//! *Ours*: colour is fetched at the fractional coordinate, geometry at the texel that holds it.
+
+use super::gbuffer::{GBuffer, Pixel};
+use super::mirror::{NOTHING, Reflected};
+use super::perturb::{PerturbParams, Perturbation};
+use crate::math::Rgb;
+use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
+use crate::scene::Geometry;
+use crate::transport::World;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// One level of the neighbour search: (2 radius + 1)² samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchLevel {
+    /// Samples to each side of the centre.
+    pub radius: i32,
+    /// Distance between samples, texels of an undistorted map; scaled by the map's derivative.
+    pub step: f32,
+}
+
+/// When a neighbouring texel's colour may be blended in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BilinearRule {
+    /// Never: the nearest texel's colour alone.
+    Nearest,
+    /// On the same reflecting object. *Paper*.
+    SameReflector,
+    /// On the same reflecting object, showing the same reflected material: does not bleed over edges seen in mirrors.
+    SameReflectorAndReflected,
+}
+
+/// Parameters of the gather.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GatherParams {
+    /// The search, coarse to fine. *Paper* (§5.2): 7x7 at 4 texels, then 3x3 at 2 texels.
+    pub search: Vec<SearchLevel>,
+    /// s_a, the factor on the energy where the reflected materials differ. *Paper*: 10.
+    pub material_penalty: f32,
+    /// φ, the falloff of a sample's weight with its energy (Eq. 2). *Paper*: 8.
+    pub falloff: f32,
+    /// How many of the eight nearest probes are asked, those of largest weight first. *Paper*: 8.
+    pub probes: usize,
+    /// How the reflection point is predicted (§5.1).
+    pub perturb: PerturbParams,
+    /// Which texels bilinear interpolation may blend.
+    pub bilinear: BilinearRule,
+    /// Divide the lobe's directional albedo out of a probe's sample and multiply the view's in. *Ours*; the paper does not.
+    pub albedo_ratio: bool,
+}
+
+impl Default for GatherParams {
+    fn default() -> Self {
+        Self {
+            bilinear: BilinearRule::SameReflectorAndReflected,
+            albedo_ratio: true,
+            perturb: PerturbParams::default(),
+            ..Self::paper()
+        }
+    }
+}
+
+impl GatherParams {
+    /// The paper's text.
+    pub fn paper() -> Self {
+        Self {
+            search: vec![SearchLevel { radius: 3, step: 4.0 }, SearchLevel { radius: 1, step: 2.0 }],
+            material_penalty: 10.0,
+            falloff: 8.0,
+            probes: 8,
+            perturb: PerturbParams::paper(),
+            bilinear: BilinearRule::SameReflector,
+            albedo_ratio: false,
+        }
+    }
+}
+
+/// What the energy compares: reflector position r, its normal n and the reflected hit R, in the probe or in the view.
+#[derive(Debug, Clone, Copy)]
+pub struct Reflection {
+    /// r, world position on the reflector.
+    pub position: Vec3,
+    /// n, unit shading normal facing the viewer.
+    pub normal: Vec3,
+    /// R, what a mirror there shows.
+    pub reflected: Reflected,
+}
+
+/// s_b: distance of the reflected hits, m. Two hits at infinity differ by the chord between their directions, as at a distance
+/// of 1 m; one at infinity and one not are as far apart as the energy can say.
+fn reflected_distance(view: &Reflected, probe: &Reflected) -> f32 {
+    if view.is_sky() == probe.is_sky() { view.point.distance(probe.point) } else { 1.0 }
+}
+
+/// E of Eq. 1: how badly a probe's sample stands in for the view's. Zero is a perfect match; at most 3 s_a.
+pub fn energy(view: &Reflection, probe: &Reflection, material_penalty: f32) -> f32 {
+    let s_a = if view.reflected.material == probe.reflected.material { 1.0 } else { material_penalty };
+    let s_b = reflected_distance(&view.reflected, &probe.reflected);
+    let s_c = 1.0 - view.normal.dot(probe.normal);
+    let s_d = 1.0 - view.reflected.direction_from(view.position).dot(probe.reflected.direction_from(probe.position));
+    s_a * (s_b.min(1.0) + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0))
+}
+
+/// Least t_i: a probe at the far side of the cell still serves a pixel that no other serves.
+const MIN_TRILINEAR: f32 = 1e-6;
+
+/// A gathered pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gathered {
+    /// Glossy radiance at the probes' reduced roughness (Eq. 2); black where `energy` is infinite.
+    pub color: Rgb,
+    /// Least energy among the probes' samples; infinite where no probe had a valid sample.
+    pub energy: f32,
+    /// The probe whose sample that was, and its texel coordinate; for inspection.
+    pub best: Option<(usize, Vec2)>,
+}
+
+impl Gathered {
+    /// Nothing was found.
+    pub const NONE: Self = Self { color: Rgb::ZERO, energy: f32::INFINITY, best: None };
+}
+
+/// A probe that takes part, with its trilinear weight t_i.
+pub struct WeightedProbe<'a> {
+    /// Index in the set.
+    pub index: usize,
+    /// The probe.
+    pub probe: &'a Probe,
+    /// t_i.
+    pub weight: f32,
+}
+
+/// Gathers all pixels of a view from `probes` (§5.2). `reflected` holds the view's mirror hits, one a pixel.
+/// `reduced` is the query at which the probes were baked.
+pub fn gather(
+    world: &World,
+    view: &GBuffer,
+    reflected: &[Reflected],
+    probes: &[WeightedProbe],
+    roughness_scale: f32,
+    params: &GatherParams,
+) -> Vec<Gathered> {
+    let width = view.size()[0];
+    view.pixels
+        .par_iter()
+        .zip(reflected)
+        .with_min_len(width)
+        .map(|(pixel, &reflected)| match pixel {
+            Some(p) if p.alpha.is_some() && reflected.material != NOTHING => {
+                gather_pixel(world, view, p, reflected, probes, roughness_scale, params)
+            }
+            _ => Gathered::NONE,
+        })
+        .collect()
+}
+
+/// What one probe offers a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// Its energy (Eq. 1).
+    pub energy: f32,
+    /// Its continuous texel coordinate.
+    pub texel: Vec2,
+}
+
+/// The sample of least energy of each of `probes` (at most eight), for a glossy pixel.
+pub fn best_samples(
+    world: &World,
+    eye: Vec3,
+    pixel: &Pixel,
+    reflected: Reflected,
+    probes: &[WeightedProbe],
+    params: &GatherParams,
+) -> [Option<Sample>; 8] {
+    let at_view = Reflection { position: pixel.surface.p, normal: pixel.normal, reflected };
+    let (r, n) = (at_view.position, at_view.normal);
+    let path = Perturbation::new(eye, r, n, reflected.distance_from(r), &pixel.curvature, &params.perturb);
+    let mut samples = [None; 8];
+    for (sample, w) in samples.iter_mut().zip(probes) {
+        let x = path.reflection_point(w.probe.position);
+        *sample = search(world, w.probe, x, pixel.surface.material, &at_view, params).map(|(energy, texel)| Sample { energy, texel });
+    }
+    samples
+}
+
+fn gather_pixel(
+    world: &World,
+    view: &GBuffer,
+    pixel: &Pixel,
+    reflected: Reflected,
+    probes: &[WeightedProbe],
+    roughness_scale: f32,
+    params: &GatherParams,
+) -> Gathered {
+    let samples = best_samples(world, view.camera.position(), pixel, reflected, probes, params);
+    let found = || probes.iter().zip(&samples).filter_map(|(w, s)| s.map(|s| (w, s)));
+    let Some((nearest, best)) = found().min_by(|a, b| a.1.energy.total_cmp(&b.1.energy)) else {
+        return Gathered::NONE;
+    };
+    // Eq. 2, with exp(-φ E_min) cancelled against Z so that it cannot underflow.
+    let (mut sum, mut z) = (Rgb::ZERO, 0.0);
+    for (w, sample) in found() {
+        let weight = w.weight.max(MIN_TRILINEAR) * (-params.falloff * (sample.energy - best.energy)).exp();
+        let mut color = fetch(&world.scene.geometry, w.probe, sample.texel, params.bilinear);
+        if params.albedo_ratio {
+            color *= albedo_ratio(world, pixel, w.probe, w.probe.texel(sample.texel), roughness_scale);
+        }
+        sum += color * weight;
+        z += weight;
+    }
+    Gathered { color: sum / z, energy: best.energy, best: Some((nearest.index, best.texel)) }
+}
+
+/// The texels that [`fetch`] may read for a sample: the four around it.
+pub fn footprint_texels(probe: &Probe, at: Vec2) -> [usize; 4] {
+    let low = (at - 0.5).floor().as_ivec2();
+    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| probe.index(low.x + i, low.y + j))
+}
+
+/// The texel coordinate of least energy around the direction from the probe to `x`, coarse level first.
+/// Only texels whose reflector is of `material` count; `None` where there is none.
+fn search(
+    world: &World,
+    probe: &Probe,
+    x: Vec3,
+    material: u32,
+    at_view: &Reflection,
+    params: &GatherParams,
+) -> Option<(f32, Vec2)> {
+    let direction = (x - probe.position).try_normalize()?;
+    let mut centre = probe.map.texel_from_direction(direction);
+    let mut best: Option<(f32, Vec2)> = None;
+    for level in &params.search {
+        let step = probe.map.search_scale(centre) * level.step;
+        for j in -level.radius..=level.radius {
+            for i in -level.radius..=level.radius {
+                let at = centre + step * Vec2::new(i as f32, j as f32);
+                let limit = best.map_or(f32::INFINITY, |b| b.0);
+                if let Some(e) = candidate_energy(world, probe, probe.texel(at), material, at_view, limit, params) {
+                    best = Some((e, at));
+                }
+            }
+        }
+        centre = best?.1;
+    }
+    best
+}
+
+/// Energy of a texel, if it is valid and below `limit`.
+fn candidate_energy(
+    world: &World,
+    probe: &Probe,
+    texel: &Texel,
+    material: u32,
+    at_view: &Reflection,
+    limit: f32,
+    params: &GatherParams,
+) -> Option<f32> {
+    if texel.triangle == NO_TRIANGLE {
+        return None;
+    }
+    let geometry = &world.scene.geometry;
+    if geometry.object(texel.triangle).material != material {
+        return None;
+    }
+    let reflected = texel.reflected();
+    // The reflected hit alone often rules a texel out, before its vertices are fetched.
+    let s_a = if reflected.material == at_view.reflected.material { 1.0 } else { params.material_penalty };
+    if s_a * reflected_distance(&at_view.reflected, &reflected).min(1.0) >= limit {
+        return None;
+    }
+    let (position, normal) = reflector(geometry, texel, probe.position);
+    let e = energy(at_view, &Reflection { position, normal, reflected }, params.material_penalty);
+    (e < limit).then_some(e)
+}
+
+/// r_p and n_p of a texel: position, and shading normal facing the probe.
+fn reflector(geometry: &Geometry, texel: &Texel, eye: Vec3) -> (Vec3, Vec3) {
+    let b = texel.barycentric();
+    let weights = [1.0 - b.x - b.y, b.x, b.y];
+    let [i, j, k] = geometry.triangles[texel.triangle as usize].map(|v| v as usize);
+    let mix = |v: &[Vec3]| v[i] * weights[0] + v[j] * weights[1] + v[k] * weights[2];
+    let position = mix(&geometry.positions);
+    let ng = geometry.area_normal(texel.triangle);
+    let n = if geometry.object(texel.triangle).face_normals { ng } else { mix(&geometry.normals) };
+    let n = n.try_normalize().unwrap_or(Vec3::Y);
+    let eye_side = ng.dot(eye - position) * ng.dot(n);
+    (position, if eye_side < 0.0 { -n } else { n })
+}
+
+/// Colour at a fractional texel coordinate, bilinear over those of the four texels around it that `rule` lets in.
+fn fetch(geometry: &Geometry, probe: &Probe, at: Vec2, rule: BilinearRule) -> Rgb {
+    let centre = probe.texel(at);
+    if rule == BilinearRule::Nearest {
+        return centre.glossy();
+    }
+    let object = geometry.triangle_object[centre.triangle as usize];
+    let f = (at - 0.5) - (at - 0.5).floor();
+    let (mut sum, mut total) = (Rgb::ZERO, 0.0);
+    let weights = [(1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y];
+    for (i, weight) in footprint_texels(probe, at).into_iter().zip(weights) {
+        let texel = &probe.texels[i];
+        let fits = texel.triangle != NO_TRIANGLE
+            && geometry.triangle_object[texel.triangle as usize] == object
+            && (rule == BilinearRule::SameReflector || texel.reflected_material == centre.reflected_material);
+        if fits {
+            sum += texel.glossy() * weight;
+            total += weight;
+        }
+    }
+    // The centre texel is among the four with a weight of at least 1/4.
+    sum / total
+}
+
+/// Directional albedo of the non-diffuse lobe in the view over that at the probe's sample, both at the probes' roughness:
+/// carries Fresnel and the specular texture over from one to the other. Clamped, as a ratio of small numbers says little.
+fn albedo_ratio(world: &World, pixel: &Pixel, probe: &Probe, texel: &Texel, roughness_scale: f32) -> Rgb {
+    use crate::transport::bsdf::{Lobes, Query};
+    use crate::transport::{Hit, Surface};
+    let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
+    let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
+    let b = texel.barycentric();
+    let there = Surface::new(&world.scene, &Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
+    let Some(wo) = (probe.position - there.p).try_normalize() else { return Rgb::ONE };
+    let view = bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query);
+    let probe = bsdf.glossy_albedo(&there, there.frame.to_local(wo), query);
+    (view / probe.max(Rgb::splat(1e-4))).clamp(Rgb::splat(0.25), Rgb::splat(4.0))
+}

@@ -1,17 +1,14 @@
-//! TODO
+//! From probes and light map to frames, one file a pass, in the order in which [`glossy_probes`] calls them (§5, §6);
+//! and the other methods that the same frames can be rendered by.
+
 pub mod aov;
-/// See the module.
 pub mod composite;
-/// See the module.
 pub mod filter;
-/// See the module.
 pub mod footprint;
-/// See the module.
 pub mod gather;
-/// See the module.
 pub mod gbuffer;
-/// See the module.
+pub mod glossy_probes;
+pub mod inspect;
 pub mod mirror;
 pub mod path_trace;
-/// See the module.
 pub mod perturb;

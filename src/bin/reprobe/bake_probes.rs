@@ -1,11 +1,168 @@
 //! `reprobe bake-probes`.
 
-use crate::common::{Common, Outcome};
+use crate::common::{Common, Outcome, Shard, parse_shard, parse_size};
+use crate::views::{FrameList, parse_frames, views};
+use anyhow::{Context, bail};
+use reprobe::io::provenance::hash_file;
+use reprobe::io::{ExrImage, Provenance};
+use reprobe::probe::bake::{BakeParams, bake_glossy, probe_geometry};
+use reprobe::probe::file::{BakedSet, MAX_MATERIALS};
+use reprobe::probe::placement::ProbeGrid;
+use reprobe::probe::qhmap::{ParameterMap, map_paths};
+use reprobe::probe::set::{ProbeSet, numbered};
+use reprobe::probe::store::write_set;
+use reprobe::probe::wanted::{Views, Wanted, wanted_texels};
+use reprobe::progress::Progress;
+use reprobe::render::gather::GatherParams;
+use reprobe::surface::curvature_file;
+use reprobe::transport::World;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
 
-/// Not yet
+/// Bake the glossy light probes
+///
+/// Each probe becomes NNNN.exr: its glossy colour at reduced roughness, the reflector (triangle and barycentrics), and what a
+/// mirror there would show. Finished probes are kept when the command runs again; set.json is written when all are there.
 #[derive(clap::Args)]
-pub struct Args {}
+#[command(after_help = "Examples:
+  reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 256
+  reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --shard 0/4
+  reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 128 \\
+      --for-path path.json --curvature curvature.exr --size 480x270 --supersample 2")]
+pub struct Args {
+    /// Mitsuba XML or JSON scene
+    scene: PathBuf,
+    /// Probe positions, from place-probes
+    #[arg(long, value_name = "FILE")]
+    probes: PathBuf,
+    /// Parameterisations, from qhmap
+    #[arg(long, value_name = "DIR")]
+    qhmap: PathBuf,
+    /// Folder of baked probes to write
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Paths a texel
+    #[arg(long, value_name = "N", default_value_t = BakeParams::default().spp)]
+    spp: u32,
+    /// Factor on roughness at the first glossy vertex
+    #[arg(long, value_name = "S", default_value_t = BakeParams::default().roughness_scale)]
+    roughness_scale: f32,
+    /// Send all of a texel's paths through its centre
+    #[arg(long)]
+    no_spread: bool,
+    /// Bake probes I, I+N, I+2N, ... only
+    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    shard: Option<Shard>,
+    /// Bake only the texels that the views of this camera path use
+    #[arg(long, value_name = "PATH.json", requires = "curvature")]
+    for_path: Option<PathBuf>,
+    /// Curvatures, for --for-path
+    #[arg(long, value_name = "FILE")]
+    curvature: Option<PathBuf>,
+    /// Size of the views, for --for-path [default: the path's]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// Frames of the path, for --for-path [default: all]
+    #[arg(long, value_name = "LIST", value_parser = parse_frames)]
+    frames: Option<FrameList>,
+    /// Rays a pixel along one side, for --for-path
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    supersample: u32,
+    /// Choose texels as the paper does, for --for-path
+    #[arg(long)]
+    paper: bool,
+}
 
-pub fn run(_args: &Args, _common: &Common) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not yet")
+pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
+    let began = Instant::now();
+    if args.spp == 0 || !(args.roughness_scale > 0.0 && args.roughness_scale <= 1.0) {
+        bail!("--spp {} --roughness-scale {}: expected at least 1, and a factor in (0, 1]", args.spp, args.roughness_scale);
+    }
+    let world = common.opaque_world(&args.scene)?;
+    let scene = &world.scene;
+    if scene.materials.len() > MAX_MATERIALS {
+        bail!("{}: {} materials, but a probe file tells at most {MAX_MATERIALS} apart", args.scene.display(), scene.materials.len());
+    }
+    let grid = ProbeGrid::read(&args.probes)?;
+    grid.provenance.check_scene(&args.probes, &scene.hash)?;
+    let maps = ProbeSet::read(&args.qhmap, "qhmap")?;
+    maps.provenance.check_scene(&args.qhmap, &scene.hash)?;
+    maps.provenance.check_input(&args.qhmap, "probes", &hash_file(&args.probes)?)?;
+
+    let params = BakeParams { spp: args.spp, roughness_scale: args.roughness_scale, spread: !args.no_spread };
+    let progress = common.progress();
+    let (views, wanted) = match &args.for_path {
+        Some(path) => {
+            let cameras: Vec<_> =
+                views(common, scene, Some(path), args.size, args.frames.as_ref())?.into_iter().map(|v| v.camera).collect();
+            let gather = if args.paper { GatherParams::paper() } else { GatherParams::default() };
+            let views = Views::new(&cameras, args.supersample, &gather);
+            let file = args.curvature.as_ref().context("--for-path needs --curvature")?;
+            let curvature = curvature_file::read(file, scene.geometry.positions.len(), &scene.hash)?;
+            let wanted = wanted_texels(&world, &curvature, &grid, &|i| Ok(ParameterMap::load(&args.qhmap, i)?.0), &cameras, &views, &progress)?;
+            (Some(views), Some(wanted))
+        }
+        None => (None, None),
+    };
+
+    let provenance = Provenance::new("bake-probes", &scene.hash, common.seed, &json!({ "bake": params, "views": views }))
+        .with_input("probes", hash_file(&args.probes)?)
+        .with_input("qhmap", hash_file(&ProbeSet::path(&args.qhmap))?);
+    let needed: Vec<usize> = match &wanted {
+        Some(w) => w.keys().copied().collect(),
+        None => (0..grid.len()).collect(),
+    };
+    let finished = |index: usize| ExrImage::read_provenance(&numbered(&args.output, index)).is_ok_and(|p| p.as_ref() == Some(&provenance));
+    let mine = needed.iter().copied().filter(|i| args.shard.is_none_or(|s| s.has(*i as u32)));
+    let todo: Vec<usize> = mine.filter(|&i| !finished(i)).collect();
+    let baked = todo.len();
+    let texels = bake(args, &world, &maps, &grid, &params, &provenance, todo, wanted, common.seed, &progress)?;
+
+    let missing = needed.iter().filter(|&&i| !finished(i)).count();
+    if missing == 0 {
+        let files = (0..grid.len()).map(|i| if needed.binary_search(&i).is_ok() { hash_file(&numbered(&args.output, i)) } else { Ok(String::new()) });
+        let set = BakedSet { size: maps.size, roughness_scale: params.roughness_scale, views, files: files.collect::<Result<_, _>>()?, provenance, grid };
+        write_set(&args.output, &set)?;
+    }
+    let seconds = began.elapsed().as_secs_f64();
+    let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
+    Ok(Outcome {
+        summary: format!("{}: {baked} probes baked, {} kept, {texels} glossy texels at {} paths, {seconds:.1} s{rest}", args.output.display(), needed.len() - baked - missing, args.spp),
+        figures: json!({ "probes": needed.len(), "baked": baked, "missing": missing, "texels": texels, "spp": args.spp, "seconds": seconds }),
+        ..Outcome::default()
+    })
+}
+
+/// Bakes and writes the probes in `todo`; returns how many texels had paths traced.
+#[allow(clippy::too_many_arguments, reason = "called once; a struct would only rename its arguments")]
+fn bake(
+    args: &Args,
+    world: &World,
+    maps: &ProbeSet,
+    grid: &ProbeGrid,
+    params: &BakeParams,
+    provenance: &Provenance,
+    todo: Vec<usize>,
+    mut wanted: Option<BTreeMap<usize, Wanted>>,
+    seed: u32,
+    progress: &dyn Progress,
+) -> anyhow::Result<u64> {
+    let rows = maps.size[1] as u64;
+    progress.start("probes", todo.len() as u64 * rows);
+    let mut texels = 0;
+    for index in todo {
+        let (mut probe, flags) = match wanted.as_mut().and_then(|w| w.remove(&index)) {
+            Some(w) => (w.probe, Some(w.texels)),
+            None => (probe_geometry(world, grid.position(index), ParameterMap::load(&args.qhmap, index)?.0), None),
+        };
+        let want = |i: u32| flags.as_ref().is_none_or(|f| f[i as usize]);
+        texels += bake_glossy(world, &mut probe, index as u32, seed, params, &want, progress);
+        let [forward, inverse] = map_paths(&args.output, index);
+        probe.map.forward_image().with_provenance(provenance.clone()).write(&forward)?;
+        probe.to_image(provenance.clone()).write(&inverse)?;
+    }
+    progress.finish();
+    Ok(texels)
 }

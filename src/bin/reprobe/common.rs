@@ -5,8 +5,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use reprobe::progress::Progress;
 use reprobe::scene::load::LoadOptions;
 use reprobe::scene::{Scene, load};
-use std::path::Path;
-use std::sync::Mutex;
+use reprobe::transport::World;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
 /// Options of every subcommand.
 #[derive(clap::Args)]
@@ -35,6 +36,32 @@ pub struct Common {
     /// Gives a scene parameter a value: NAME=VALUE for `$NAME`
     #[arg(long = "define", short = 'D', global = true, value_name = "NAME=VALUE")]
     pub defines: Vec<String>,
+    /// The scene of the last stage: stages run in one process load it once.
+    #[arg(skip)]
+    opaque: Arc<Mutex<Option<(PathBuf, Arc<World>)>>>,
+}
+
+/// `--shard I/N`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shard {
+    index: u32,
+    count: u32,
+}
+
+impl Shard {
+    /// Whether item `i` is this shard's.
+    pub fn has(&self, i: u32) -> bool {
+        i % self.count == self.index
+    }
+}
+
+/// Parses `I/N`, I from 0.
+pub fn parse_shard(text: &str) -> Result<Shard, String> {
+    let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    match parsed {
+        Some((index, count)) if index < count => Ok(Shard { index, count }),
+        _ => Err("expected I/N with I from 0 to N-1, like 0/4".into()),
+    }
 }
 
 /// What a subcommand did.
@@ -79,6 +106,26 @@ impl Common {
             eprintln!("reprobe: warning: {w}");
         }
         Ok(scene)
+    }
+
+    /// The opaque part of a scene, ready for rays; says how many transmissive shapes were left out.
+    pub fn opaque_world(&self, path: &Path) -> anyhow::Result<Arc<World>> {
+        let mut slot = self.opaque.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some((_, world)) = slot.as_ref().filter(|(p, _)| p == path) {
+            return Ok(world.clone());
+        }
+        let (world, left_out) = World::opaque(self.load_scene(path)?);
+        if left_out > 0 {
+            eprintln!("reprobe: warning: {left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces");
+        }
+        let world = Arc::new(world);
+        *slot = Some((path.into(), world.clone()));
+        Ok(world)
+    }
+
+    /// Lets this stage use the scene that `other` has loaded, and the other way round.
+    pub fn share_scene(&mut self, other: &Self) {
+        self.opaque = other.opaque.clone();
     }
 
     /// Prints a result to stdout.

@@ -5,16 +5,20 @@ mod bake_probes;
 mod common;
 mod compare;
 mod curvature;
+mod info;
 mod place_probes;
 mod probe_set;
 mod qhmap;
+mod render_glossy;
 mod render_path;
 mod resmap;
 mod run;
+mod set_params;
 mod timings;
+mod views;
 
 use clap::Parser;
-use common::Common;
+use common::{Common, Outcome};
 use std::process::ExitCode;
 
 /// Bakes glossy global illumination into light probes and reprojects it into new views.
@@ -37,23 +41,14 @@ enum Command {
     BakeLightmap(bake_lightmap::Args),
     RenderPath(render_path::Args),
     Compare(compare::Args),
+    Info(info::Args),
     Run(run::Args),
 }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let common = &cli.common;
-    let result = common.start().and_then(|()| match &cli.command {
-        Command::PlaceProbes(args) => place_probes::run(args, common),
-        Command::Resmap(args) => resmap::run(args, common),
-        Command::Qhmap(args) => qhmap::run(args, common),
-        Command::Curvature(args) => curvature::run(args, common),
-        Command::BakeProbes(args) => bake_probes::run(args, common),
-        Command::BakeLightmap(args) => bake_lightmap::run(args, common),
-        Command::RenderPath(args) => render_path::run(args, common),
-        Command::Compare(args) => compare::run(args, common),
-        Command::Run(args) => run::run(args, common),
-    });
+    let result = common.start().and_then(|()| dispatch(&cli.command, common));
     match result {
         Ok(outcome) => {
             common.report(&outcome);
@@ -63,5 +58,20 @@ fn main() -> ExitCode {
             eprintln!("reprobe: error: {error:#}");
             ExitCode::from(2)
         }
+    }
+}
+
+fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
+    match command {
+        Command::PlaceProbes(args) => place_probes::run(args, common),
+        Command::Resmap(args) => resmap::run(args, common),
+        Command::Qhmap(args) => qhmap::run(args, common),
+        Command::Curvature(args) => curvature::run(args, common),
+        Command::BakeProbes(args) => bake_probes::run(args, common),
+        Command::BakeLightmap(args) => bake_lightmap::run(args, common),
+        Command::RenderPath(args) => render_path::run(args, common),
+        Command::Compare(args) => compare::run(args, common),
+        Command::Info(args) => info::run(args, common),
+        Command::Run(args) => run::run(args, common),
     }
 }

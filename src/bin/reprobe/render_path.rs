@@ -1,8 +1,10 @@
 //! `reprobe render-path`.
 
 use crate::common::{Common, Outcome, parse_size};
+use crate::render_glossy;
 use crate::timings::{FrameTimings, Timings, timed};
-use anyhow::{Context, bail};
+use crate::views::{FrameList, View, parse_frames, views};
+use anyhow::bail;
 use clap::ValueEnum;
 use reprobe::io::{ExrImage, Provenance, atomic};
 use reprobe::progress::Progress;
@@ -19,13 +21,13 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// Mitsuba scene, XML or JSON
     #[arg(value_name = "SCENE")]
-    scene: PathBuf,
+    pub scene: PathBuf,
     /// Camera path [default: one frame from the scene's own sensor]
     #[arg(long, value_name = "PATH.json")]
     path: Option<PathBuf>,
     /// Folder for NNNN.exr and timings.json; finished frames in it are kept
     #[arg(long, short, value_name = "FOLDER")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// How to render
     #[arg(long, value_enum, default_value = "glossy-probes")]
     method: Method,
@@ -38,9 +40,30 @@ pub struct Args {
     /// Most scattering vertices of a path [default: unbounded]
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
-    /// Auxiliary layers of the first hit
+    /// Auxiliary layers: the first hit's, and the buffers of glossy-probes' passes
     #[arg(long, value_enum, value_name = "LAYERS")]
-    aov: Option<Aov>,
+    pub aov: Option<Aov>,
+    /// Only these frames of the path
+    #[arg(long, value_name = "LIST", value_parser = parse_frames)]
+    frames: Option<FrameList>,
+    /// glossy-probes: the baked probes
+    #[arg(long, value_name = "DIR")]
+    pub probes: Option<PathBuf>,
+    /// glossy-probes: the diffuse light
+    #[arg(long, value_name = "FILE.exr")]
+    pub lightmap: Option<PathBuf>,
+    /// glossy-probes: curvatures of the scene
+    #[arg(long, value_name = "FILE.exr")]
+    pub curvature: Option<PathBuf>,
+    /// glossy-probes: N x N rays a pixel through all passes
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub supersample: u32,
+    /// glossy-probes: the paper's text in every choice
+    #[arg(long)]
+    pub paper: bool,
+    /// glossy-probes: set a parameter of a pass, like gather.falloff=4; a wrong name lists them all
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -52,67 +75,45 @@ enum Method {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Aov {
+pub enum Aov {
     /// depth, normal, position, material, albedo, alpha
     All,
 }
 
-/// What all methods need, checked.
-struct Resolved<'a> {
-    args: &'a Args,
-    common: &'a Common,
-    scene: Scene,
-    cameras: Vec<Camera>,
-    timings: Timings,
-}
-
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
-    let resolved = Resolved::from_args(args, common)?;
+    let timings = Timings {
+        method: args.method.to_possible_value().map_or_else(String::new, |v| v.get_name().into()),
+        threads: rayon::current_num_threads(),
+        ..Timings::default()
+    };
     match args.method {
-        Method::GlossyProbes => bail!("--method glossy-probes: not yet"),
-        Method::PathTrace => run_path_trace(resolved),
+        Method::GlossyProbes => render_glossy::run(args, common, timings),
+        Method::PathTrace => run_path_trace(args, common, timings),
     }
 }
 
-impl<'a> Resolved<'a> {
-    fn from_args(args: &'a Args, common: &'a Common) -> anyhow::Result<Self> {
-        let (scene, load_ms) = timed(|| common.load_scene(&args.scene));
-        let scene = scene?;
-        let mut cameras = match &args.path {
-            Some(path) => bail!("{}: camera paths: not yet", path.display()),
-            None => {
-                let sensor = scene.sensor.clone();
-                vec![sensor.with_context(|| format!("{}: has no sensor; give a camera path with --path", args.scene.display()))?]
-            }
-        };
-        if let Some(size) = args.size {
-            cameras.iter_mut().for_each(|c| c.size = size);
-        }
-        let timings = Timings {
-            method: args.method.to_possible_value().map_or_else(String::new, |v| v.get_name().into()),
-            threads: rayon::current_num_threads(),
-            load_ms,
-            ..Timings::default()
-        };
-        Ok(Self { args, common, scene, cameras, timings })
-    }
+/// The views that the command line asks for.
+pub fn views_of(args: &Args, common: &Common, scene: &Scene) -> anyhow::Result<Vec<View>> {
+    views(common, scene, args.path.as_deref(), args.size, args.frames.as_ref())
 }
 
-fn run_path_trace(r: Resolved) -> anyhow::Result<Outcome> {
-    let Resolved { args, common, scene, cameras, mut timings } = r;
+fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
     let params = PathTraceParams {
         spp: args.spp,
         path: PathParams { max_depth: args.max_depth.unwrap_or(u32::MAX), ..PathParams::default() },
     };
+    let (scene, load_ms) = timed(|| common.load_scene(&args.scene));
+    let scene = scene?;
     if scene.emitters.is_empty() {
         bail!("{}: has no emitter; every frame would be black", args.scene.display());
     }
+    let views = views_of(args, common, &scene)?;
     let (world, build_ms) = timed(|| World::new(scene));
-    timings.build_ms = build_ms;
+    (timings.load_ms, timings.build_ms) = (load_ms, build_ms);
 
     let bar = common.progress();
-    bar.start("path-trace", cameras.iter().map(|c| u64::from(c.size[1])).sum());
-    for (frame, camera) in (0u32..).zip(&cameras) {
+    bar.start("path-trace", views.iter().map(|v| u64::from(v.camera.size[1])).sum());
+    for View { frame, camera } in &views {
         let mut times = FrameTimings { name: format!("{frame:04}.exr"), ..FrameTimings::default() };
         let path = args.output.join(&times.name);
         let parameters = json!({
@@ -123,7 +124,7 @@ fn run_path_trace(r: Resolved) -> anyhow::Result<Outcome> {
             times.kept = true;
             bar.advance(u64::from(camera.size[1]));
         } else {
-            let layers = times.pass("path_trace", || path_trace(&world, camera, &params, common.seed, frame, &bar));
+            let layers = times.pass("path_trace", || path_trace(&world, camera, &params, common.seed, *frame, &bar));
             let mut image = ExrImage::new(camera.size[0] as usize, camera.size[1] as usize)
                 .with_rgb("", &layers.full())
                 .with_rgb("emission", &layers.emission)
@@ -142,7 +143,7 @@ fn run_path_trace(r: Resolved) -> anyhow::Result<Outcome> {
 }
 
 /// Writes `timings.json` and sums up the run.
-fn finish(mut timings: Timings, output: &Path) -> anyhow::Result<Outcome> {
+pub fn finish(mut timings: Timings, output: &Path) -> anyhow::Result<Outcome> {
     timings.finish();
     atomic::write_json(&output.join("timings.json"), &timings)?;
     let kept = timings.frames.iter().filter(|f| f.kept).count();
@@ -157,12 +158,12 @@ fn finish(mut timings: Timings, output: &Path) -> anyhow::Result<Outcome> {
 }
 
 /// Whether an earlier run with the same inputs and parameters wrote this frame.
-fn is_finished(path: &Path, provenance: &Provenance) -> bool {
-    path.exists() && ExrImage::read(path).is_ok_and(|image| image.provenance.as_ref() == Some(provenance))
+pub fn is_finished(path: &Path, provenance: &Provenance) -> bool {
+    ExrImage::read_provenance(path).is_ok_and(|found| found.as_ref() == Some(provenance))
 }
 
 /// The camera, as provenance keeps it.
-fn describe(camera: &Camera) -> serde_json::Value {
+pub fn describe(camera: &Camera) -> serde_json::Value {
     json!({
         "to_world": camera.to_world.to_cols_array(), "fov_x_rad": camera.fov_x, "size": camera.size,
         "aperture_radius": camera.aperture_radius, "focus_distance": camera.focus_distance,

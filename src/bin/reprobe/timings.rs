@@ -19,6 +19,8 @@ pub struct Timings {
     pub frames: Vec<FrameTimings>,
     /// Mean of each pass over the frames rendered in this run, milliseconds.
     pub mean_ms: BTreeMap<String, f64>,
+    /// Most memory that probes took at once, bytes; 0 for methods without them.
+    pub probe_memory_bytes: u64,
     /// Most memory that the process has held, bytes; `None` where the system does not say.
     pub peak_memory_bytes: Option<u64>,
 }
@@ -30,6 +32,8 @@ pub struct FrameTimings {
     pub name: String,
     /// An earlier run had finished it.
     pub kept: bool,
+    /// Share of sub-pixels that neither a probe nor the frame before served; `None` for methods without probes.
+    pub unserved_fraction: Option<f64>,
     /// Milliseconds of each pass.
     pub passes_ms: BTreeMap<String, f64>,
 }

@@ -1,0 +1,108 @@
+//! `reprobe render-path --method glossy-probes`.
+
+use crate::common::Common;
+use crate::common::Outcome;
+use crate::render_path::{Args, describe, finish, is_finished, views_of};
+use crate::set_params::apply;
+use crate::timings::{FrameTimings, Timings, timed};
+use anyhow::{Context, bail};
+use reprobe::io::provenance::hash_file;
+use reprobe::io::{ExrImage, Provenance};
+use reprobe::lightmap::LightMap;
+use reprobe::probe::store::ProbeStore;
+use reprobe::probe::wanted::Views;
+use reprobe::progress::Progress;
+use reprobe::render::aov::with_first_hits;
+use reprobe::render::glossy_probes::{Frame, GlossyProbeParams, Renderer};
+use reprobe::render::inspect::with_passes;
+use reprobe::scene::Camera;
+use reprobe::surface::curvature_file;
+use reprobe::transport::World;
+use serde_json::json;
+
+/// Probes kept in memory by default: the eight of one camera, and those of the cells around it.
+const PROBE_CACHE: usize = 64;
+
+pub fn params(args: &Args) -> anyhow::Result<GlossyProbeParams> {
+    let base = if args.paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() };
+    apply(&GlossyProbeParams { supersample: args.supersample, ..base }, &args.set)
+}
+
+pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
+    let params = params(args)?;
+    let (world, load_ms) = timed(|| common.opaque_world(&args.scene));
+    let world = world?;
+    timings.load_ms = load_ms;
+    let scene = &world.scene;
+    let wanted = views_of(args, common, scene)?;
+    let cameras: Vec<Camera> = wanted.iter().map(|v| v.camera.clone()).collect();
+    let folder = args.probes.as_ref().context("--method glossy-probes needs --probes DIR, written by bake-probes")?;
+    let file = args.curvature.as_ref().context("--method glossy-probes needs --curvature FILE, written by curvature")?;
+    let mut probes = ProbeStore::open(folder, scene, PROBE_CACHE)?;
+    if let Some(views) = &probes.set.views {
+        if *views != Views::new(&cameras, params.supersample, &params.gather) {
+            let message = "its texels were baked for other views (another path, size, --supersample or gather parameters)";
+            bail!("{}: {message}; run bake-probes again for these, or without --for-path", folder.display());
+        }
+    }
+    let curvature = curvature_file::read(file, scene.geometry.positions.len(), &scene.hash)?;
+    let lightmap = args.lightmap.as_ref().map(|path| LightMap::load(path, scene)).transpose()?;
+    if lightmap.is_none() {
+        eprintln!("reprobe: warning: no --lightmap: the diffuse layer is black");
+    }
+
+    let mut base = Provenance::new("render-path", &scene.hash, common.seed, &json!({}))
+        .with_input("probes", probes.hash.clone())
+        .with_input("curvature", hash_file(file)?);
+    if let Some(path) = &args.lightmap {
+        base = base.with_input("lightmap", hash_file(path)?);
+    }
+    let frames: Vec<_> = wanted
+        .iter()
+        .map(|v| {
+            let parameters = json!({
+                "method": timings.method, "frame": v.frame, "glossy_probes": params, "aov": args.aov.is_some(),
+                "camera": describe(&v.camera),
+            });
+            (args.output.join(format!("{:04}.exr", v.frame)), Provenance { parameters, ..base.clone() })
+        })
+        .collect();
+    // A frame may borrow pixels from the one before it, so the path is rendered as a whole.
+    let kept = frames.iter().all(|(path, provenance)| is_finished(path, provenance));
+
+    let supersample = params.supersample;
+    let mut renderer = Renderer::new(&world, &curvature, lightmap.as_ref(), params, probes.set.roughness_scale);
+    let bar = common.progress();
+    bar.start("glossy-probes", frames.len() as u64);
+    for (camera, (path, provenance)) in cameras.iter().zip(frames) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut times = FrameTimings { name, kept, ..FrameTimings::default() };
+        if !kept {
+            let frame = renderer.frame(camera, &mut probes)?;
+            for &(pass, ms) in &frame.passes {
+                times.passes_ms.insert(pass.into(), ms);
+            }
+            times.unserved_fraction = Some(frame.unserved as f64 / frame.buffers.gathered.len() as f64);
+            let image = image(&frame, camera, args.aov.is_some().then_some((&*world, supersample)));
+            times.pass("write", || image.with_provenance(provenance).write(&path))?;
+        }
+        timings.probe_memory_bytes = timings.probe_memory_bytes.max(probes.resident_bytes() as u64);
+        timings.frames.push(times);
+        bar.advance(1);
+    }
+    bar.finish();
+    finish(timings, &args.output)
+}
+
+fn image(frame: &Frame, camera: &Camera, inspect: Option<(&World, u32)>) -> ExrImage {
+    let full: Vec<_> = (0..frame.glossy.len()).map(|i| frame.emission[i] + frame.diffuse[i] + frame.glossy[i]).collect();
+    let image = ExrImage::new(camera.size[0] as usize, camera.size[1] as usize)
+        .with_rgb("", &full)
+        .with_rgb("emission", &frame.emission)
+        .with_rgb("diffuse", &frame.diffuse)
+        .with_rgb("glossy", &frame.glossy);
+    match inspect {
+        Some((world, supersample)) => with_passes(with_first_hits(image, world, camera), frame, supersample),
+        None => image,
+    }
+}

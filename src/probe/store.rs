@@ -1,0 +1,97 @@
+//! A folder of baked probes, read as they are needed.
+
+use super::file::{BakedSet, Probe};
+use super::qhmap::{ParameterMap, map_paths};
+use crate::io::{ExrImage, atomic, provenance::hash_file};
+use crate::scene::Scene;
+use crate::{Error, Result};
+use glam::Vec3;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Name of the file that says that a set is whole.
+pub const SET_FILE: &str = "set.json";
+
+/// A probe folder, and those of its probes that are in memory.
+pub struct ProbeStore {
+    folder: PathBuf,
+    /// The folder's `set.json`.
+    pub set: BakedSet,
+    /// Content hash of `set.json`.
+    pub hash: String,
+    triangles: usize,
+    materials: usize,
+    resident: BTreeMap<usize, (u64, Arc<Probe>)>,
+    capacity: usize,
+    clock: u64,
+}
+
+impl ProbeStore {
+    /// Opens a folder that was baked from `scene`; keeps at most `capacity` probes (at least 8) in memory.
+    pub fn open(folder: &Path, scene: &Scene, capacity: usize) -> Result<Self> {
+        let path = folder.join(SET_FILE);
+        let text = std::fs::read_to_string(&path).map_err(|e| {
+            let hint = if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
+            Error::input(&path, format!("{e}{hint}"))
+        })?;
+        let set: BakedSet = serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
+        set.provenance.check_scene(&path, &scene.hash)?;
+        if set.files.len() != set.grid.len() {
+            return Err(Error::input(&path, format!("{} files for {} probes", set.files.len(), set.grid.len())));
+        }
+        Ok(Self {
+            folder: folder.into(),
+            hash: hash_file(&path)?,
+            set,
+            triangles: scene.geometry.triangles.len(),
+            materials: scene.materials.len(),
+            resident: BTreeMap::new(),
+            capacity: capacity.max(8),
+            clock: 0,
+        })
+    }
+
+    /// The probe of an index; read from disk if it is not in memory, in place of the one used longest ago.
+    pub fn probe(&mut self, index: usize) -> Result<Arc<Probe>> {
+        self.clock += 1;
+        if let Some((used, probe)) = self.resident.get_mut(&index) {
+            *used = self.clock;
+            return Ok(probe.clone());
+        }
+        let probe = Arc::new(self.read(index)?);
+        if self.resident.len() >= self.capacity {
+            if let Some(oldest) = self.resident.iter().min_by_key(|(_, (used, _))| *used).map(|(i, _)| *i) {
+                self.resident.remove(&oldest);
+            }
+        }
+        self.resident.insert(index, (self.clock, probe.clone()));
+        Ok(probe)
+    }
+
+    fn read(&self, index: usize) -> Result<Probe> {
+        let [forward, path] = map_paths(&self.folder, index);
+        if self.set.files[index].is_empty() {
+            return Err(Error::input(&path, "was not baked: the set serves the views of one camera path; bake it again for these"));
+        }
+        let image = ExrImage::read(&path)?;
+        let map = ParameterMap::from_images((&forward, &ExrImage::read(&forward)?), (&path, &image))?.without_inverse();
+        let [width, height] = self.set.size.map(|s| s as usize);
+        if (image.width, image.height) != (width, height) {
+            let message = format!("{} x {} texels, but {SET_FILE} says {width} x {height}", image.width, image.height);
+            return Err(Error::input(&path, message));
+        }
+        let position: Vec3 = self.set.grid.position(index);
+        Probe::from_image(&path, &image, map, position, self.triangles, self.materials)
+    }
+
+    /// Bytes of the probes in memory.
+    pub fn resident_bytes(&self) -> usize {
+        self.resident.values().map(|(_, p)| p.bytes()).sum()
+    }
+}
+
+/// Writes `set.json`: the last step of a bake.
+pub fn write_set(folder: &Path, set: &BakedSet) -> Result<()> {
+    atomic::write_json(&folder.join(SET_FILE), set)
+}

@@ -1,0 +1,99 @@
+//! Which texels the views of a camera path fetch: a bake for that path alone can leave the others out.
+//!
+//! *Ours*. Gathering needs the geometry maps only to choose its texels, and these cost two rays a texel. So the gather runs first,
+//! on probes whose glossy map is still black, and the bake then fills just the texels that it read.
+
+use super::bake::probe_geometry;
+use super::file::Probe;
+use super::placement::ProbeGrid;
+use super::qhmap::ParameterMap;
+use crate::Result;
+use crate::progress::Progress;
+use crate::render::gather::{GatherParams, WeightedProbe, best_samples, footprint_texels};
+use crate::render::gbuffer::gbuffer;
+use crate::render::glossy_probes::nearest_probes;
+use crate::render::mirror::mirror_hit;
+use crate::scene::Camera;
+use crate::surface::CurvatureMap;
+use crate::transport::World;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A probe's geometry, and which of its texels are fetched.
+pub struct Wanted {
+    /// Reflector and reflected maps; black glossy map.
+    pub probe: Probe,
+    /// One flag a texel.
+    pub texels: Vec<bool>,
+}
+
+/// The views that a partial bake serves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Views {
+    /// blake3 of the cameras' numbers, hex.
+    pub cameras: String,
+    /// Rays a pixel, along one side.
+    pub supersample: u32,
+    /// How the texels are chosen.
+    pub gather: GatherParams,
+}
+
+impl Views {
+    /// The views of `cameras`.
+    pub fn new(cameras: &[Camera], supersample: u32, gather: &GatherParams) -> Self {
+        let mut hash = blake3::Hasher::new();
+        for c in cameras {
+            let numbers = c.to_world.to_cols_array();
+            hash.update(bytemuck::cast_slice(&numbers));
+            hash.update(&c.fov_x.to_le_bytes());
+            hash.update(bytemuck::cast_slice(&c.size));
+        }
+        Self { cameras: hash.finalize().to_hex().to_string(), supersample, gather: gather.clone() }
+    }
+}
+
+/// Runs the gather of every view on the probes' geometry. The result holds the probes that the views use, by index.
+pub fn wanted_texels(
+    world: &World,
+    curvature: &CurvatureMap,
+    grid: &ProbeGrid,
+    map: &dyn Fn(usize) -> Result<ParameterMap>,
+    cameras: &[Camera],
+    views: &Views,
+    progress: &dyn Progress,
+) -> Result<BTreeMap<usize, Wanted>> {
+    let mut probes: BTreeMap<usize, (Probe, Vec<AtomicBool>)> = BTreeMap::new();
+    progress.start("texels that the views use", cameras.len() as u64);
+    for camera in cameras {
+        let near = nearest_probes(grid, camera.position(), views.gather.probes);
+        for &(index, _) in &near {
+            if let std::collections::btree_map::Entry::Vacant(entry) = probes.entry(index) {
+                let probe = probe_geometry(world, grid.position(index), map(index)?);
+                let flags = probe.texels.iter().map(|_| AtomicBool::new(false)).collect();
+                entry.insert((probe, flags));
+            }
+        }
+        let weighted: Vec<_> =
+            near.iter().map(|&(index, weight)| WeightedProbe { index, probe: &probes[&index].0, weight }).collect();
+        let fine = Camera { size: camera.size.map(|s| s * views.supersample), ..camera.clone() };
+        gbuffer(world, curvature, &fine).pixels.par_iter().flatten().filter(|p| p.alpha.is_some()).for_each(|pixel| {
+            let reflected = mirror_hit(world, &pixel.surface, pixel.wo);
+            let samples = best_samples(world, fine.position(), pixel, reflected, &weighted, &views.gather);
+            for (w, sample) in weighted.iter().zip(samples) {
+                let Some(sample) = sample else { continue };
+                for texel in footprint_texels(w.probe, sample.texel) {
+                    probes[&w.index].1[texel].store(true, Ordering::Relaxed);
+                }
+            }
+        });
+        progress.advance(1);
+    }
+    progress.finish();
+    let done = |(index, (probe, flags)): (usize, (Probe, Vec<AtomicBool>))| {
+        (index, Wanted { probe, texels: flags.into_iter().map(AtomicBool::into_inner).collect() })
+    };
+    Ok(probes.into_iter().map(done).collect())
+}

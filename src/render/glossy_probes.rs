@@ -1,0 +1,238 @@
+//! One frame by glossy probe reprojection: the method's table of contents (§5, §6).
+
+use super::composite::{Previous, diffuse_layer, downsample, reproject_previous};
+use super::filter::{FilterInput, FilterParams, filter};
+use super::footprint::{Footprint, FootprintParams, GlossyPoint};
+use super::gather::{GatherParams, Gathered, WeightedProbe, gather};
+use super::gbuffer::{GBuffer, Pixel, gbuffer};
+use super::mirror::{Reflected, mirror_hit};
+use crate::Result;
+use crate::lightmap::LightMap;
+use crate::math::Rgb;
+use crate::probe::placement::{ProbeGrid, ProbeWeight};
+use crate::probe::store::ProbeStore;
+use crate::scene::Camera;
+use crate::surface::CurvatureMap;
+use crate::transport::World;
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// All parameters of the method at run time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlossyProbeParams {
+    /// N x N rays a pixel through all passes, averaged at the end.
+    pub supersample: u32,
+    /// §5.2.
+    pub gather: GatherParams,
+    /// §6.1; `None` leaves the gathered colours unfiltered.
+    pub footprint: Option<FootprintParams>,
+    /// §6.2, §6.3.
+    pub filter: FilterParams,
+}
+
+impl Default for GlossyProbeParams {
+    fn default() -> Self {
+        Self {
+            supersample: 1,
+            gather: GatherParams::default(),
+            footprint: Some(FootprintParams::default()),
+            filter: FilterParams::default(),
+        }
+    }
+}
+
+impl GlossyProbeParams {
+    /// The paper's text in every choice.
+    pub fn paper() -> Self {
+        Self {
+            supersample: 1,
+            gather: GatherParams::paper(),
+            footprint: Some(FootprintParams::paper()),
+            filter: FilterParams::paper(),
+        }
+    }
+}
+
+/// A frame's layers, at its final size; their sum is the frame.
+pub struct Frame {
+    /// LE: emission seen directly, and the environment.
+    pub emission: Vec<Rgb>,
+    /// L(S|D)*DE from the light map.
+    pub diffuse: Vec<Rgb>,
+    /// L(S|D)*S+E from the probes.
+    pub glossy: Vec<Rgb>,
+    /// Milliseconds a pass, in order.
+    pub passes: Vec<(&'static str, f64)>,
+    /// Sub-pixels that no probe and no earlier frame served.
+    pub unserved: usize,
+    /// Per-sub-pixel buffers, for inspection.
+    pub buffers: Buffers,
+}
+
+/// Per-sub-pixel buffers of a frame, at `supersample` times its size.
+pub struct Buffers {
+    /// The G-buffer.
+    pub view: GBuffer,
+    /// Mirror hits.
+    pub reflected: Vec<Reflected>,
+    /// Before the filter.
+    pub gathered: Vec<Gathered>,
+    /// Footprint covariances, pixels².
+    pub covariance: Vec<[f32; 3]>,
+}
+
+/// What stays the same from frame to frame.
+pub struct Renderer<'a> {
+    /// The scene.
+    pub world: &'a World,
+    /// Curvatures of its vertices.
+    pub curvature: &'a CurvatureMap,
+    /// Its diffuse light; without it, the diffuse layer is black.
+    pub lightmap: Option<&'a LightMap>,
+    /// Parameters.
+    pub params: GlossyProbeParams,
+    footprint: Option<Footprint>,
+    previous: Option<Previous>,
+}
+
+impl<'a> Renderer<'a> {
+    /// Tabulates the footprints (§6.1) that probes baked at `roughness_scale` leave to the filter.
+    pub fn new(
+        world: &'a World,
+        curvature: &'a CurvatureMap,
+        lightmap: Option<&'a LightMap>,
+        params: GlossyProbeParams,
+        roughness_scale: f32,
+    ) -> Self {
+        let footprint = params.footprint.map(|f| Footprint::new(&FootprintParams { roughness_scale, ..f }));
+        Self { world, curvature, lightmap, params, footprint, previous: None }
+    }
+
+    /// Renders the next frame of a path.
+    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+        let n = self.params.supersample;
+        let fine = Camera { size: camera.size.map(|s| s * n), ..camera.clone() };
+        let size = fine.size.map(|s| s as usize);
+        let mut clock = Clock::start();
+
+        let near: Vec<_> = nearest_probes(&probes.set.grid, camera.position(), self.params.gather.probes)
+            .into_iter()
+            .map(|(index, weight)| Ok((index, probes.probe(index)?, weight)))
+            .collect::<Result<_>>()?;
+        clock.lap("load");
+        let view = gbuffer(self.world, self.curvature, &fine);
+        clock.lap("gbuffer");
+        let reflected = mirror_pass(self.world, &view);
+        clock.lap("mirror");
+        let roughness_scale = probes.set.roughness_scale;
+        let weighted: Vec<_> =
+            near.iter().map(|(index, probe, weight)| WeightedProbe { index: *index, probe, weight: *weight }).collect();
+        let mut gathered = gather(self.world, &view, &reflected, &weighted, roughness_scale, &self.params.gather);
+        let unserved = reproject_previous(&view, &mut gathered, self.previous.as_ref());
+        clock.lap("gather");
+        let covariance = match &self.footprint {
+            Some(footprint) => footprint_pass(footprint, &view, &reflected),
+            None => vec![[0.0; 3]; gathered.len()],
+        };
+        clock.lap("footprint");
+        let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter);
+        clock.lap("filter");
+        let diffuse = match self.lightmap {
+            Some(map) => diffuse_layer(&self.world.scene, &view, map),
+            None => vec![Rgb::ZERO; glossy.len()],
+        };
+        let emission: Vec<Rgb> =
+            view.pixels.iter().zip(&view.background).map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission)).collect();
+        let frame = Frame {
+            emission: downsample(&emission, size, n as usize),
+            diffuse: downsample(&diffuse, size, n as usize),
+            glossy: downsample(&glossy, size, n as usize),
+            passes: Vec::new(),
+            unserved,
+            buffers: Buffers { view: view.clone(), reflected, gathered, covariance },
+        };
+        self.previous = Some(Previous { view, glossy });
+        clock.lap("composite");
+        Ok(Frame { passes: clock.laps, ..frame })
+    }
+}
+
+/// The eight probes nearest a camera with their trilinear weights (§5.2), or the `count` of largest weight.
+pub fn nearest_probes(grid: &ProbeGrid, eye: Vec3, count: usize) -> Vec<(usize, f32)> {
+    // At the border of the grid, and in a grid of one layer, corners coincide.
+    let mut merged: Vec<(usize, f32)> = Vec::with_capacity(8);
+    for ProbeWeight { probe, weight } in grid.around(eye) {
+        match merged.iter_mut().find(|(i, _)| *i == probe) {
+            Some((_, w)) => *w += weight,
+            None if grid.is_blocked(probe) => {}
+            None => merged.push((probe, weight)),
+        }
+    }
+    merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    merged.truncate(count.clamp(1, 8));
+    merged
+}
+
+fn mirror_pass(world: &World, view: &GBuffer) -> Vec<Reflected> {
+    view.pixels
+        .par_iter()
+        .with_min_len(view.size()[0])
+        .map(|pixel| match pixel {
+            Some(p) if p.alpha.is_some() => mirror_hit(world, &p.surface, p.wo),
+            _ => Reflected::NONE,
+        })
+        .collect()
+}
+
+/// Σ_I of every pixel (Eq. 3): what the probes' reduced roughness lacks, pixels².
+fn footprint_pass(footprint: &Footprint, view: &GBuffer, reflected: &[Reflected]) -> Vec<[f32; 3]> {
+    let of = |(pixel, reflected): (&Option<Pixel>, &Reflected)| {
+        let p = pixel.as_ref()?;
+        let (x, n) = (p.surface.p, p.normal);
+        let reflected_distance = reflected.distance_from(x);
+        let point = GlossyPoint { x, n, reflected_distance, alpha: p.alpha?, curvature: &p.curvature };
+        Some(footprint.covariance(&view.camera, &point))
+    };
+    let pixels = view.pixels.par_iter().zip(reflected).with_min_len(view.size()[0]);
+    pixels.map(|p| of(p).unwrap_or([0.0; 3])).collect()
+}
+
+fn filter_pass(view: &GBuffer, gathered: &[Gathered], covariance: &[[f32; 3]], params: &FilterParams) -> Vec<Rgb> {
+    let [width, height] = view.size();
+    let glossy = |f: &dyn Fn(&Pixel) -> u32| -> Vec<u32> {
+        view.pixels.iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(u32::MAX, f)).collect()
+    };
+    filter(
+        &FilterInput {
+            width,
+            height,
+            color: &gathered.iter().map(|g| g.color).collect::<Vec<_>>(),
+            normal: &view.pixels.iter().map(|p| p.as_ref().map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
+            depth: &view.pixels.iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
+            material: &glossy(&|p| p.surface.material),
+            covariance,
+            energy: &gathered.iter().map(|g| g.energy).collect::<Vec<_>>(),
+        },
+        params,
+    )
+}
+
+struct Clock {
+    last: Instant,
+    laps: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self { last: Instant::now(), laps: Vec::new() }
+    }
+
+    fn lap(&mut self, pass: &'static str) {
+        let now = Instant::now();
+        self.laps.push((pass, (now - self.last).as_secs_f64() * 1e3));
+        self.last = now;
+    }
+}

@@ -1,0 +1,188 @@
+//! The probe stages together, on a room whose reflections are known in closed form.
+
+use glam::{Vec2, Vec3};
+use reprobe::io::Provenance;
+use reprobe::probe::bake::{BakeParams, bake_glossy, probe_geometry};
+use reprobe::probe::file::Probe;
+use reprobe::probe::qhmap::ParameterMap;
+use reprobe::progress::Silent;
+use reprobe::render::gather::{GatherParams, Gathered, WeightedProbe, gather};
+use reprobe::render::gbuffer::{GBuffer, gbuffer};
+use reprobe::render::mirror::{Reflected, mirror_hit};
+use reprobe::scene::load::{LoadOptions, load};
+use reprobe::scene::{Camera, Scene};
+use reprobe::surface::{CurvatureMap, CurvatureParams, curvature};
+use reprobe::transport::World;
+
+/// A wall of a room from -2 to 2 in x and y and 0 to 4 in z, as Mitsuba's rectangle turned and moved, glowing in its own colour.
+fn wall(rotate: &str, translate: &str, radiance: &str) -> String {
+    format!(
+        r#"<shape type="rectangle"><transform name="to_world"><scale value="2"/>{rotate}<translate value="{translate}"/></transform>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
+        <emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter></shape>"#
+    )
+}
+
+/// The room with `reflector` in it; its walls' radiances differ, so that each pixel of a mirror tells which wall it shows.
+fn room(reflector: &str) -> Scene {
+    let turn = |x: i32, y: i32, angle: i32| format!(r#"<rotate x="{x}" y="{y}" z="0" angle="{angle}"/>"#);
+    let walls = [
+        wall("", "0,0,0", "1,0,0"),
+        wall(&turn(0, 1, 180), "0,0,4", "0,2,0"),
+        wall(&turn(0, 1, 90), "-2,0,2", "0,0,3"),
+        wall(&turn(0, 1, -90), "2,0,2", "4,4,0"),
+        wall(&turn(1, 0, -90), "0,-2,2", "0,5,5"),
+        wall(&turn(1, 0, 90), "0,2,2", "6,0,6"),
+    ];
+    let xml = format!(r#"<scene version="3.0.0">{}{reflector}</scene>"#, walls.concat());
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("room.xml");
+    std::fs::write(&path, xml).unwrap();
+    load(&path, &LoadOptions::default()).unwrap()
+}
+
+const MIRROR: &str = r#"<bsdf type="twosided"><bsdf type="conductor"><string name="material" value="none"/></bsdf></bsdf>"#;
+
+struct Setup {
+    world: World,
+    curvature: CurvatureMap,
+    probes: Vec<Probe>,
+}
+
+impl Setup {
+    /// Eight probes around `centre`, `spacing` apart, plain lat-long of `width` texels.
+    fn new(scene: Scene, centre: Vec3, spacing: f32, width: u32) -> Self {
+        let curvature = curvature(&scene.geometry, &CurvatureParams::default(), &Silent);
+        let (world, left_out) = World::opaque(scene);
+        assert_eq!(left_out, 0);
+        let params = BakeParams { spp: 4, ..BakeParams::default() };
+        let probes = (0..8u32)
+            .map(|i| {
+                let corner = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) - 0.5;
+                let mut probe = probe_geometry(&world, centre + corner * spacing, ParameterMap::identity([width, width / 2]));
+                bake_glossy(&world, &mut probe, i, 0, &params, &|_| true, &Silent);
+                probe
+            })
+            .collect();
+        Self { world, curvature, probes }
+    }
+
+    fn view(&self, origin: Vec3, target: Vec3) -> (GBuffer, Vec<Reflected>) {
+        let camera = Camera::look_at(origin, target, Vec3::Y, 1.0, [64, 48]);
+        let view = gbuffer(&self.world, &self.curvature, &camera);
+        let mirror = |p: &reprobe::render::gbuffer::Pixel| mirror_hit(&self.world, &p.surface, p.wo);
+        let reflected = view.pixels.iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(Reflected::NONE, mirror)).collect();
+        (view, reflected)
+    }
+
+    fn gather(&self, view: &GBuffer, reflected: &[Reflected], params: &GatherParams) -> Vec<Gathered> {
+        let weighted: Vec<_> =
+            self.probes.iter().enumerate().map(|(index, probe)| WeightedProbe { index, probe, weight: 0.125 }).collect();
+        gather(&self.world, view, reflected, &weighted, 0.5, params)
+    }
+
+    /// What a mirror pixel should show: the radiance of the wall that its mirror ray meets.
+    fn expected(&self, reflected: &Reflected) -> Vec3 {
+        let m = &self.world.scene.materials;
+        let walls = self.world.scene.geometry.objects.iter().position(|o| o.material == u32::from(reflected.material)).unwrap();
+        assert!(m.len() > usize::from(reflected.material));
+        [Vec3::new(1., 0., 0.), Vec3::new(0., 2., 0.), Vec3::new(0., 0., 3.), Vec3::new(4., 4., 0.), Vec3::new(0., 5., 5.), Vec3::new(6., 0., 6.)]
+            [walls]
+    }
+}
+
+/// Fractions of mirror pixels that show the right wall, and that found any sample. Pixels within `EDGE` of one that shows something
+/// else are left out: there a texel may see either side.
+fn score(setup: &Setup, view: &GBuffer, reflected: &[Reflected], params: &GatherParams) -> (f64, f64) {
+    const EDGE: i32 = 3;
+    let gathered = setup.gather(view, reflected, params);
+    let [width, height] = view.size().map(|n| n as i32);
+    let shows = |x: i32, y: i32| reflected[(y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize].material;
+    let is_wall = |m: u16| setup.world.scene.geometry.objects.iter().any(|o| o.material == u32::from(m) && o.emitter.is_some());
+    let (mut right, mut served, mut total) = (0u32, 0u32, 0u32);
+    for i in 0..width * height {
+        let (x, y) = (i % width, i / width);
+        let m = shows(x, y);
+        let inside = (-EDGE..=EDGE).all(|dy| (-EDGE..=EDGE).all(|dx| shows(x + dx, y + dy) == m));
+        if !is_wall(m) || !inside {
+            continue;
+        }
+        let (r, g) = (&reflected[i as usize], &gathered[i as usize]);
+        total += 1;
+        served += u32::from(g.energy.is_finite());
+        right += u32::from((g.color - setup.expected(r)).abs().max_element() < 0.01);
+    }
+    assert!(total > 150, "the view sees {total} mirror pixels away from edges");
+    (f64::from(right) / f64::from(total), f64::from(served) / f64::from(total))
+}
+
+#[test]
+fn a_plane_mirror_shows_the_room_at_every_pixel() {
+    let scene = room(&format!(
+        r#"<shape type="rectangle"><transform name="to_world"><translate value="0,0,0.1"/></transform>{MIRROR}</shape>"#
+    ));
+    let setup = Setup::new(scene, Vec3::new(0.2, 0.1, 2.0), 0.6, 256);
+    let (view, reflected) = setup.view(Vec3::new(0.3, 0.05, 2.1), Vec3::new(0.0, 0.0, 0.0));
+    let (right, served) = score(&setup, &view, &reflected, &GatherParams::default());
+    assert!(right > 0.995, "{right}");
+    assert!(served > 0.999, "{served}");
+}
+
+#[test]
+fn the_paraboloid_serves_a_mirror_sphere_better_than_its_tangent_planes() {
+    let sphere = format!(
+        r#"<shape type="sphere"><point name="center" x="0" y="0" z="1.2"/><float name="radius" value="0.8"/>{MIRROR}</shape>"#
+    );
+    let setup = Setup::new(room(&sphere), Vec3::new(0.2, 0.1, 2.9), 0.6, 256);
+    let (view, reflected) = setup.view(Vec3::new(0.3, 0.05, 2.95), Vec3::new(0.0, 0.0, 1.2));
+    let (second, served) = score(&setup, &view, &reflected, &GatherParams::default());
+    let mut plane = GatherParams::default();
+    plane.perturb.order = reprobe::render::perturb::Order::Plane;
+    let (flat, _) = score(&setup, &view, &reflected, &plane);
+    println!("paraboloid {second}, plane {flat}, served {served}");
+    assert!(second > 0.95, "{second}");
+    assert!(served > 0.98, "{served}");
+    assert!(second > flat + 0.02, "paraboloid {second}, plane {flat}");
+}
+
+#[test]
+fn a_probe_survives_its_file() {
+    let scene = room(&format!(
+        r#"<shape type="rectangle"><transform name="to_world"><translate value="0,0,0.1"/></transform>{MIRROR}</shape>"#
+    ));
+    let (triangles, materials) = (scene.geometry.triangles.len(), scene.materials.len());
+    let setup = Setup::new(scene, Vec3::new(0.2, 0.1, 2.0), 0.6, 64);
+    let probe = &setup.probes[3];
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("0003.exr");
+    let image = probe.to_image(Provenance::new("bake-probes", "abc", 0, &()));
+    image.write(&path).unwrap();
+    let read = reprobe::io::ExrImage::read(&path).unwrap();
+    let back = Probe::from_image(&path, &read, probe.map.clone(), probe.position, triangles, materials).unwrap();
+    assert_eq!(back.texels, probe.texels);
+    let error = Probe::from_image(&path, &read, probe.map.clone(), probe.position, 3, materials).unwrap_err().to_string();
+    assert!(error.contains("reflector.triangle") && error.contains("0003.exr"), "{error}");
+}
+
+#[test]
+fn threads_do_not_change_a_bit_of_a_bake() {
+    let rough = r#"<shape type="rectangle"><transform name="to_world"><translate value="0,0,0.1"/></transform>
+        <bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></shape>"#;
+    let bake = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Setup::new(room(rough), Vec3::new(0.2, 0.1, 2.0), 0.6, 32)).probes.into_iter().map(|p| p.texels).collect::<Vec<_>>()
+    };
+    let one = bake(1);
+    assert!(one.iter().flatten().any(|t| t.glossy() != Vec3::ZERO));
+    assert_eq!(one, bake(4));
+}
+
+#[test]
+fn texel_coordinates_wrap_around_and_stop_at_the_poles() {
+    let map = ParameterMap::identity([8, 4]);
+    let probe = Probe { position: Vec3::ZERO, size: [8, 4], texels: vec![reprobe::probe::file::Texel::EMPTY; 32], map };
+    assert_eq!(probe.index(-1, 0), 7);
+    assert_eq!(probe.index(8, 3), 24);
+    assert_eq!(probe.index(0, 9), 24);
+    assert!(std::ptr::eq(probe.texel(Vec2::new(-0.5, -2.0)), &raw const probe.texels[7]));
+}
