@@ -71,7 +71,8 @@ impl Setup {
         let camera = Camera::look_at(origin, target, Vec3::Y, 1.0, [64, 48]);
         let view = gbuffer(&self.world, &self.curvature, &camera);
         let mirror = |p: &reprobe::render::gbuffer::Pixel| mirror_hit(&self.world, &p.surface, p.wo);
-        let reflected = view.pixels.iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(Reflected::NONE, mirror)).collect();
+        let reflected =
+            view.pixels.iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(Reflected::NONE, mirror)).collect();
         (view, reflected)
     }
 
@@ -86,8 +87,14 @@ impl Setup {
         let m = &self.world.scene.materials;
         let walls = self.world.scene.geometry.objects.iter().position(|o| o.material == u32::from(reflected.material)).unwrap();
         assert!(m.len() > usize::from(reflected.material));
-        [Vec3::new(1., 0., 0.), Vec3::new(0., 2., 0.), Vec3::new(0., 0., 3.), Vec3::new(4., 4., 0.), Vec3::new(0., 5., 5.), Vec3::new(6., 0., 6.)]
-            [walls]
+        [
+            Vec3::new(1., 0., 0.),
+            Vec3::new(0., 2., 0.),
+            Vec3::new(0., 0., 3.),
+            Vec3::new(4., 4., 0.),
+            Vec3::new(0., 5., 5.),
+            Vec3::new(6., 0., 6.),
+        ][walls]
     }
 }
 
@@ -170,7 +177,11 @@ fn threads_do_not_change_a_bit_of_a_bake() {
         <bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></shape>"#;
     let bake = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Setup::new(room(rough), Vec3::new(0.2, 0.1, 2.0), 0.6, 32)).probes.into_iter().map(|p| p.texels).collect::<Vec<_>>()
+        pool.install(|| Setup::new(room(rough), Vec3::new(0.2, 0.1, 2.0), 0.6, 32))
+            .probes
+            .into_iter()
+            .map(|p| p.texels)
+            .collect::<Vec<_>>()
     };
     let one = bake(1);
     assert!(one.iter().flatten().any(|t| t.glossy() != Vec3::ZERO));

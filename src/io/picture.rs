@@ -107,7 +107,10 @@ fn vector(triple: &[Vec<f32>; 3]) -> (String, Vec<[u8; 3]>) {
     let ranges: [(f32, f32); 3] = std::array::from_fn(|c| range(&triple[c]));
     let legend = ranges.map(|(lo, hi)| format!("{lo:.3} to {hi:.3}")).join(", ");
     let value = |c: usize, i: usize| byte((triple[c][i] - ranges[c].0) / (ranges[c].1 - ranges[c].0).max(1e-20));
-    ((format!("X, Y, Z as red, green, blue: {legend}")), (0..triple[0].len()).map(|i| std::array::from_fn(|c| value(c, i))).collect())
+    (
+        (format!("X, Y, Z as red, green, blue: {legend}")),
+        (0..triple[0].len()).map(|i| std::array::from_fn(|c| value(c, i))).collect(),
+    )
 }
 
 fn scalar(values: &[f32]) -> (String, Vec<[u8; 3]>) {

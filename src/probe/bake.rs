@@ -92,14 +92,7 @@ pub fn bake_glossy(
 }
 
 /// Mean of the paths of one texel; `None` where its centre sees no glossy surface.
-fn glossy_texel(
-    world: &World,
-    position: Vec3,
-    map: &ParameterMap,
-    texel: u32,
-    stream: u32,
-    params: &BakeParams,
-) -> Option<Rgb> {
+fn glossy_texel(world: &World, position: Vec3, map: &ParameterMap, texel: u32, stream: u32, params: &BakeParams) -> Option<Rgb> {
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: params.roughness_scale };
     let to_centre = direction(map, texel, Vec2::splat(0.5));
     let centre = world.intersect(&Ray::new(position, to_centre)).filter(|s| is_glossy(world, s, -to_centre))?;

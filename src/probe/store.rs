@@ -32,7 +32,8 @@ impl ProbeStore {
     pub fn open(folder: &Path, scene: &Scene, capacity: usize) -> Result<Self> {
         let path = folder.join(SET_FILE);
         let text = std::fs::read_to_string(&path).map_err(|e| {
-            let hint = if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
+            let hint =
+                if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
             Error::input(&path, format!("{e}{hint}"))
         })?;
         let set: BakedSet = serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
@@ -60,10 +61,10 @@ impl ProbeStore {
             return Ok(probe.clone());
         }
         let probe = Arc::new(self.read(index)?);
-        if self.resident.len() >= self.capacity {
-            if let Some(oldest) = self.resident.iter().min_by_key(|(_, (used, _))| *used).map(|(i, _)| *i) {
-                self.resident.remove(&oldest);
-            }
+        if self.resident.len() >= self.capacity
+            && let Some(oldest) = self.resident.iter().min_by_key(|(_, (used, _))| *used).map(|(i, _)| *i)
+        {
+            self.resident.remove(&oldest);
         }
         self.resident.insert(index, (self.clock, probe.clone()));
         Ok(probe)
@@ -72,7 +73,10 @@ impl ProbeStore {
     fn read(&self, index: usize) -> Result<Probe> {
         let [forward, path] = map_paths(&self.folder, index);
         if self.set.files[index].is_empty() {
-            return Err(Error::input(&path, "was not baked: the set serves the views of one camera path; bake it again for these"));
+            return Err(Error::input(
+                &path,
+                "was not baked: the set serves the views of one camera path; bake it again for these",
+            ));
         }
         let image = ExrImage::read(&path)?;
         let map = ParameterMap::from_images((&forward, &ExrImage::read(&forward)?), (&path, &image))?.without_inverse();

@@ -187,7 +187,8 @@ pub fn best_samples(
     let mut samples = [None; 8];
     for (sample, w) in samples.iter_mut().zip(probes) {
         let x = path.reflection_point(w.probe.position);
-        *sample = search(world, w.probe, x, pixel.surface.material, &at_view, params).map(|(energy, texel)| Sample { energy, texel });
+        *sample =
+            search(world, w.probe, x, pixel.surface.material, &at_view, params).map(|(energy, texel)| Sample { energy, texel });
     }
     samples
 }

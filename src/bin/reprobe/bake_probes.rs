@@ -83,7 +83,11 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let world = common.opaque_world(&args.scene)?;
     let scene = &world.scene;
     if scene.materials.len() > MAX_MATERIALS {
-        bail!("{}: {} materials, but a probe file tells at most {MAX_MATERIALS} apart", args.scene.display(), scene.materials.len());
+        bail!(
+            "{}: {} materials, but a probe file tells at most {MAX_MATERIALS} apart",
+            args.scene.display(),
+            scene.materials.len()
+        );
     }
     let grid = ProbeGrid::read(&args.probes)?;
     grid.provenance.check_scene(&args.probes, &scene.hash)?;
@@ -101,7 +105,15 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
             let views = Views::new(&cameras, args.supersample, &gather);
             let file = args.curvature.as_ref().context("--for-path needs --curvature")?;
             let curvature = curvature_file::read(file, scene.geometry.positions.len(), &scene.hash)?;
-            let wanted = wanted_texels(&world, &curvature, &grid, &|i| Ok(ParameterMap::load(&args.qhmap, i)?.0), &cameras, &views, &progress)?;
+            let wanted = wanted_texels(
+                &world,
+                &curvature,
+                &grid,
+                &|i| Ok(ParameterMap::load(&args.qhmap, i)?.0),
+                &cameras,
+                &views,
+                &progress,
+            )?;
             (Some(views), Some(wanted))
         }
         None => (None, None),
@@ -114,7 +126,8 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         Some(w) => w.keys().copied().collect(),
         None => (0..grid.len()).collect(),
     };
-    let finished = |index: usize| ExrImage::read_provenance(&numbered(&args.output, index)).is_ok_and(|p| p.as_ref() == Some(&provenance));
+    let finished =
+        |index: usize| ExrImage::read_provenance(&numbered(&args.output, index)).is_ok_and(|p| p.as_ref() == Some(&provenance));
     let mine = needed.iter().copied().filter(|i| args.shard.is_none_or(|s| s.has(*i as u32)));
     let todo: Vec<usize> = mine.filter(|&i| !finished(i)).collect();
     let baked = todo.len();
@@ -122,14 +135,27 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
 
     let missing = needed.iter().filter(|&&i| !finished(i)).count();
     if missing == 0 {
-        let files = (0..grid.len()).map(|i| if needed.binary_search(&i).is_ok() { hash_file(&numbered(&args.output, i)) } else { Ok(String::new()) });
-        let set = BakedSet { size: maps.size, roughness_scale: params.roughness_scale, views, files: files.collect::<Result<_, _>>()?, provenance, grid };
+        let files = (0..grid.len())
+            .map(|i| if needed.binary_search(&i).is_ok() { hash_file(&numbered(&args.output, i)) } else { Ok(String::new()) });
+        let set = BakedSet {
+            size: maps.size,
+            roughness_scale: params.roughness_scale,
+            views,
+            files: files.collect::<Result<_, _>>()?,
+            provenance,
+            grid,
+        };
         write_set(&args.output, &set)?;
     }
     let seconds = began.elapsed().as_secs_f64();
     let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
     Ok(Outcome {
-        summary: format!("{}: {baked} probes baked, {} kept, {texels} glossy texels at {} paths, {seconds:.1} s{rest}", args.output.display(), needed.len() - baked - missing, args.spp),
+        summary: format!(
+            "{}: {baked} probes baked, {} kept, {texels} glossy texels at {} paths, {seconds:.1} s{rest}",
+            args.output.display(),
+            needed.len() - baked - missing,
+            args.spp
+        ),
         figures: json!({ "probes": needed.len(), "baked": baked, "missing": missing, "texels": texels, "spp": args.spp, "seconds": seconds }),
         ..Outcome::default()
     })

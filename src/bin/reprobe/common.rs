@@ -116,7 +116,9 @@ impl Common {
         }
         let (world, left_out) = World::opaque(self.load_scene(path)?);
         if left_out > 0 {
-            eprintln!("reprobe: warning: {left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces");
+            eprintln!(
+                "reprobe: warning: {left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces"
+            );
         }
         let world = Arc::new(world);
         *slot = Some((path.into(), world.clone()));

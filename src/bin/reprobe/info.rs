@@ -40,7 +40,11 @@ pub fn run(args: &Args, _common: &Common) -> anyhow::Result<Outcome> {
         let hi = finite.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mean = finite.iter().sum::<f64>() / finite.len().max(1) as f64;
         let bad = values.len() - finite.len();
-        writeln!(summary, "  {name:24} {kind:6} min {lo:<12.6} mean {mean:<12.6} max {hi:<12.6}{}", if bad > 0 { format!(" {bad} not finite") } else { String::new() })?;
+        writeln!(
+            summary,
+            "  {name:24} {kind:6} min {lo:<12.6} mean {mean:<12.6} max {hi:<12.6}{}",
+            if bad > 0 { format!(" {bad} not finite") } else { String::new() }
+        )?;
         channels.push(json!({ "name": name, "type": kind, "min": lo, "mean": mean, "max": hi, "not_finite": bad }));
     }
     if let Some(p) = &image.provenance {

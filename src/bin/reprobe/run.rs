@@ -170,7 +170,8 @@ impl Stage {
     }
 
     fn command_line(&self) -> String {
-        let quote = |a: &String| if a.contains([' ', '\'', '"', '$']) { format!("'{}'", a.replace('\'', r"'\''")) } else { a.clone() };
+        let quote =
+            |a: &String| if a.contains([' ', '\'', '"', '$']) { format!("'{}'", a.replace('\'', r"'\''")) } else { a.clone() };
         format!("reprobe {}", self.0.iter().map(quote).collect::<Vec<_>>().join(" "))
     }
 }
@@ -192,7 +193,9 @@ fn stages(args: &Args, common: &Common) -> Vec<Stage> {
         s = s.optional("--unit-scale", (common.unit_scale != 1.0).then_some(common.unit_scale));
         common.defines.iter().fold(s, |s, d| s.option("--define", d))
     };
-    let view = |s: Stage| s.optional("--path", path.as_ref()).optional("--size", size.as_ref()).optional("--frames", args.frames.as_ref());
+    let view = |s: Stage| {
+        s.optional("--path", path.as_ref()).optional("--size", size.as_ref()).optional("--frames", args.frames.as_ref())
+    };
 
     let place = stage("place-probes").option("--count", args.probes.unwrap_or(preset.probes));
     let mut bake = stage("bake-probes")

@@ -56,8 +56,7 @@ pub fn views(
     }
     let count = cameras.len();
     let chosen = |frame: u32| frames.is_none_or(|f| f.0.iter().any(|r| r.contains(&frame)));
-    let views: Vec<View> =
-        (0..).zip(cameras).filter(|(i, _)| chosen(*i)).map(|(frame, camera)| View { frame, camera }).collect();
+    let views: Vec<View> = (0..).zip(cameras).filter(|(i, _)| chosen(*i)).map(|(frame, camera)| View { frame, camera }).collect();
     if views.is_empty() {
         bail!("--frames {}: the path has frames 0 to {}", frames.map(ToString::to_string).unwrap_or_default(), count - 1);
     }
