@@ -108,7 +108,8 @@ impl Bitmap {
         (upper * (1.0 - t.y) + lower * t.y) * self.scale
     }
 
-    fn texel(&self, p: Vec2) -> Rgb {
+    /// The pixel at the whole coordinates `p`, which may lie outside; `scale` is not in it.
+    pub(crate) fn texel(&self, p: Vec2) -> Rgb {
         let x = self.wrap.index(p.x as i64, self.image.width as i64);
         let y = self.wrap.index(p.y as i64, self.image.height as i64);
         self.image.pixels[y * self.image.width + x]

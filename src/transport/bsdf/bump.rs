@@ -10,8 +10,7 @@
 use super::{Bsdf, BsdfSample, Lobes, Query, Scatter, Surface};
 use crate::math::{Frame, Rgb, luminance};
 use crate::scene::Texture;
-use crate::scene::texture::{Bitmap, Wrap};
-use glam::{IVec2, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 /// A height field that tilts the frame.
 #[derive(Debug, Clone)]
@@ -169,32 +168,15 @@ impl<T: Tilted> Scatter for T {
 /// which are flat but for their edges.
 fn height_gradient(texture: &Texture, uv: Vec2) -> Vec2 {
     let Texture::Bitmap(bitmap) = texture else { return Vec2::ZERO };
-    if bitmap.nearest || bitmap.image.pixels.is_empty() {
+    if bitmap.nearest || !uv.is_finite() {
         return Vec2::ZERO;
     }
     let size = Vec2::new(bitmap.image.width as f32, bitmap.image.height as f32);
     let p = bitmap.to_uv.transform_point2(uv) * size - 0.5;
     let (corner, f) = (p.floor(), p - p.floor());
-    let at = |x, y| height(bitmap, corner.as_ivec2() + IVec2::new(x, y));
-    let (h00, h10, h01, h11) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
+    let at = |x, y| bitmap.scale * luminance(bitmap.texel(corner + Vec2::new(x, y)));
+    let (h00, h10, h01, h11) = (at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0));
     let per_pixel = Vec2::new((h10 - h00) * (1.0 - f.y) + (h11 - h01) * f.y, (h01 - h00) * (1.0 - f.x) + (h11 - h10) * f.x);
     // Mitsuba's order: turned into the surface's uv before the size multiplies it.
     bitmap.to_uv.matrix2.transpose() * per_pixel * size
-}
-
-fn height(bitmap: &Bitmap, pixel: IVec2) -> f32 {
-    let wrap = |i: i32, n: usize| {
-        let n = i32::try_from(n).unwrap_or(i32::MAX);
-        let i = match bitmap.wrap {
-            Wrap::Repeat => i.rem_euclid(n),
-            Wrap::Mirror => {
-                let j = i.rem_euclid(n.saturating_mul(2));
-                if j < n { j } else { n.saturating_mul(2) - 1 - j }
-            }
-            Wrap::Clamp => i.clamp(0, n - 1),
-        };
-        i as usize
-    };
-    let (x, y) = (wrap(pixel.x, bitmap.image.width), wrap(pixel.y, bitmap.image.height));
-    bitmap.scale * luminance(bitmap.image.pixels[y * bitmap.image.width + x])
 }

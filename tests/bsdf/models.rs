@@ -1,4 +1,4 @@
-//! Our scattering models against Mitsuba's values, stored by scripts/bsdf_reference.py.
+//! The models of scripts/bsdf_reference.py, by name, and the surface that they lie on.
 
 use glam::{Affine2, Vec2, Vec3};
 use reprobe::math::{Frame, Rgb};
@@ -6,50 +6,17 @@ use reprobe::scene::Texture;
 use reprobe::scene::texture::{Bitmap, Image, Wrap};
 use reprobe::transport::Surface;
 use reprobe::transport::bsdf::*;
-use serde::Deserialize;
 use std::sync::Arc;
 
-#[derive(Deserialize)]
-struct Reference {
-    wi: Vec<Vec3Json>,
-    wo: Vec<Vec3Json>,
-    cases: Vec<Case>,
-    samples: Vec<SampleCase>,
-}
-
-type Vec3Json = [f32; 3];
-
-/// Rows over wi, then wo: eval (diffuse RGB, non-diffuse RGB; or the whole, where not split) and pdf.
-#[derive(Deserialize)]
-struct Case {
-    model: String,
-    uv: [f32; 2],
-    split: bool,
-    rows: Vec<Vec<f32>>,
-}
-
-/// A delta sample: wo, weight, pdf, eta; null where the model is black.
-#[derive(Deserialize)]
-struct SampleCase {
-    model: String,
-    wi: Vec3Json,
-    u: f32,
-    sample: Option<[f32; 8]>,
-}
-
-fn reference() -> Reference {
-    serde_json::from_str(include_str!("data/bsdf_reference.json")).unwrap()
-}
-
-fn grey(v: f32) -> Texture {
+pub fn grey(v: f32) -> Texture {
     Texture::Constant(Rgb::splat(v))
 }
 
-const ORANGE: Texture = Texture::Constant(Rgb::new(0.8, 0.4, 0.1));
-const PINK: Texture = Texture::Constant(Rgb::new(0.9, 0.6, 0.7));
+pub const ORANGE: Texture = Texture::Constant(Rgb::new(0.8, 0.4, 0.1));
+pub const PINK: Texture = Texture::Constant(Rgb::new(0.9, 0.6, 0.7));
 
 /// The surface of the script's `interaction`.
-fn surface(uv: [f32; 2]) -> Surface {
+pub fn surface(uv: [f32; 2]) -> Surface {
     let (dp_du, dp_dv) = (Vec3::new(1.3, 0.2, 0.0), Vec3::new(-0.1, 0.9, 0.0));
     let n = Vec3::new(0.1, 0.2, 1.0).normalize();
     Surface {
@@ -69,61 +36,61 @@ fn surface(uv: [f32; 2]) -> Surface {
     }
 }
 
-fn bitmap(offset: f32, wrap: Wrap, to_uv: Affine2) -> Texture {
+pub fn bitmap(offset: f32, wrap: Wrap, to_uv: Affine2) -> Texture {
     let value = |x: usize, y: usize, c: usize| ((3 * x + 5 * y + 2 * c) % 7) as f32 / 10.0 + offset;
     let pixels = (0..12).map(|i| (i % 4, i / 4)).map(|(x, y)| Vec3::new(value(x, y, 0), value(x, y, 1), value(x, y, 2)));
     let image = Arc::new(Image { width: 4, height: 3, pixels: pixels.collect() });
     Texture::Bitmap(Bitmap { image, to_uv, nearest: false, wrap, scale: 1.0 })
 }
 
-fn plastic_params(nonlinear: bool) -> PlasticParams {
+pub fn plastic_params(nonlinear: bool) -> PlasticParams {
     PlasticParams { int_ior: 1.5, ext_ior: 1.0, nonlinear, diffuse_reflectance: ORANGE, specular_reflectance: PINK }
 }
 
-fn plastic(nonlinear: bool) -> Bsdf {
+pub fn plastic(nonlinear: bool) -> Bsdf {
     Bsdf::Plastic(Box::new(Plastic::new(plastic_params(nonlinear)).unwrap()))
 }
 
-fn roughplastic(alpha: f32, distribution: Distribution, nonlinear: bool) -> Bsdf {
+pub fn roughplastic(alpha: f32, distribution: Distribution, nonlinear: bool) -> Bsdf {
     Bsdf::RoughPlastic(Box::new(RoughPlastic::new(plastic_params(nonlinear), alpha, distribution).unwrap()))
 }
 
-fn metal(specular_reflectance: Texture) -> Conductor {
+pub fn metal(specular_reflectance: Texture) -> Conductor {
     Conductor { eta: Rgb::new(0.2, 0.92, 1.1), k: Rgb::new(3.9, 2.45, 2.1), specular_reflectance }
 }
 
-fn roughconductor(alpha: [f32; 2], distribution: Distribution, specular: Texture) -> Bsdf {
+pub fn roughconductor(alpha: [f32; 2], distribution: Distribution, specular: Texture) -> Bsdf {
     let [alpha_u, alpha_v] = alpha.map(grey);
     Bsdf::RoughConductor(Box::new(RoughConductor { metal: metal(specular), alpha_u, alpha_v, distribution }))
 }
 
-fn glass(specular_transmittance: Texture) -> DielectricParams {
+pub fn glass(specular_transmittance: Texture) -> DielectricParams {
     DielectricParams { int_ior: 1.5, ext_ior: 1.0, specular_reflectance: grey(1.0), specular_transmittance }
 }
 
-fn roughdielectric(alpha: f32, distribution: Distribution, transmittance: Texture) -> Bsdf {
+pub fn roughdielectric(alpha: f32, distribution: Distribution, transmittance: Texture) -> Bsdf {
     let model = RoughDielectric::new(glass(transmittance), grey(alpha), grey(alpha), distribution);
     Bsdf::RoughDielectric(Box::new(model.unwrap()))
 }
 
-fn principled(params: PrincipledParams) -> Bsdf {
+pub fn principled(params: PrincipledParams) -> Bsdf {
     Bsdf::Principled(Box::new(Principled::new(PrincipledParams { base_color: ORANGE, ..params }).unwrap()))
 }
 
-fn bump(texture: Texture, scale: f32, nested: Bsdf) -> Bsdf {
+pub fn bump(texture: Texture, scale: f32, nested: Bsdf) -> Bsdf {
     Bsdf::BumpMap(BumpMap { texture, scale, nested: Box::new(nested) })
 }
 
-fn normal(texture: Texture, nested: Bsdf) -> Bsdf {
+pub fn normal(texture: Texture, nested: Bsdf) -> Bsdf {
     Bsdf::NormalMap(NormalMap { texture, nested: Box::new(nested) })
 }
 
-fn twosided(model: Bsdf) -> Bsdf {
+pub fn twosided(model: Bsdf) -> Bsdf {
     Bsdf::TwoSided(TwoSided::new(model.clone(), model).unwrap())
 }
 
 /// The script's model of that name.
-fn model(name: &str) -> Bsdf {
+pub fn model(name: &str) -> Bsdf {
     use Distribution::{Beckmann, Ggx};
     let diffuse = || Bsdf::Diffuse(Diffuse { reflectance: ORANGE });
     let anisotropic = || roughconductor([0.3, 0.1], Ggx, grey(1.0));
@@ -187,67 +154,5 @@ fn model(name: &str) -> Bsdf {
         "dielectric" => Bsdf::Dielectric(Box::new(Dielectric::new(glass(PINK)).unwrap())),
         "thindielectric" => Bsdf::ThinDielectric(Box::new(ThinDielectric::new(glass(PINK)).unwrap())),
         _ => panic!("unknown model {name}"),
-    }
-}
-
-/// Largest relative difference; values below 1e-4 count as that.
-fn differences(ours: &[f32], theirs: &[f32]) -> f32 {
-    let relative = |(a, b): (&f32, &f32)| (a - b).abs() / b.abs().max(a.abs()).max(1e-4);
-    ours.iter().zip(theirs).map(relative).fold(0.0, f32::max)
-}
-
-/// Rounding (of half vectors between grazing directions above all), except that Mitsuba integrates the tables of `roughplastic` with few nodes (worst for smooth coatings at
-/// grazing angles), and takes the tangent of a map's tilt from 1 - cos², which cancels.
-fn tolerance(model: &str) -> f32 {
-    match model.split('_').next() {
-        Some("roughplastic") => 5e-3,
-        Some("bumpmap" | "normalmap") => 5e-4,
-        _ => 3e-5,
-    }
-}
-
-#[test]
-fn values_and_densities_are_mitsubas() {
-    let reference = reference();
-    let mut failures = Vec::new();
-    for case in &reference.cases {
-        let (bsdf, s) = (model(&case.model), surface(case.uv));
-        assert_eq!(case.rows.len(), reference.wi.len() * reference.wo.len());
-        let pairs = reference.wi.iter().flat_map(|wi| reference.wo.iter().map(move |wo| (wi, wo)));
-        let mut worst: (f32, String) = (0.0, String::new());
-        for ((wi, wo), row) in pairs.zip(&case.rows) {
-            let (wi, wo) = (Vec3::from(*wi), Vec3::from(*wo));
-            let eval = |lobes| bsdf.eval(&s, wi, wo, Query { lobes, ..Query::default() }).to_array();
-            let mut ours =
-                if case.split { [eval(Lobes::DIFFUSE), eval(Lobes::NON_DIFFUSE)].concat() } else { eval(Lobes::ALL).to_vec() };
-            ours.push(bsdf.pdf(&s, wi, wo, Query::default()));
-            let difference = differences(&ours, row);
-            if difference > worst.0 || difference.is_nan() {
-                worst = (difference, format!("wi {wi} wo {wo}: ours {ours:?}, Mitsuba's {row:?}"));
-            }
-        }
-        println!("{} {:?}: {:.2e}", case.model, case.uv, worst.0);
-        if worst.0.is_nan() || worst.0 > tolerance(&case.model) {
-            failures.push(format!("{} at {:?}: {:.2e}, {}", case.model, case.uv, worst.0, worst.1));
-        }
-    }
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
-    assert!(reference.cases.len() > 20);
-}
-
-#[test]
-fn delta_samples_are_mitsubas() {
-    for case in reference().samples {
-        let (bsdf, s) = (model(&case.model), surface([0.3, 0.6]));
-        let ours = bsdf.sample(&s, case.wi.into(), case.u, Vec2::new(0.3, 0.8), Query::default());
-        let name = format!("{} wi {:?} u {}", case.model, case.wi, case.u);
-        match (ours, case.sample) {
-            (None, None) => {}
-            (Some(b), Some(theirs)) => {
-                let ours = [b.wo.to_array().as_slice(), &b.weight.to_array(), &[b.pdf, b.eta]].concat();
-                assert!(b.delta && differences(&ours, &theirs) < 1e-4, "{name}: ours {ours:?}, Mitsuba's {theirs:?}");
-            }
-            (ours, theirs) => panic!("{name}: ours {ours:?}, Mitsuba's {theirs:?}"),
-        }
     }
 }
