@@ -68,7 +68,7 @@ fn light_may_travel_either_way() {
             let mut sampler = Sampler::new(11, i);
             let (a, b) = (direction(sampler.next_1d(), sampler.next_1d()), direction(sampler.next_1d(), sampler.next_1d()));
             let (there, back) = (bsdf.eval(&s, a, b, Query::default()) / b.z, bsdf.eval(&s, b, a, Query::default()) / a.z);
-            assert!((there - back).abs().max_element() < 1e-3 * there.max_element(), "{name}: {a} {b}: {there} {back}");
+            assert!((there - back).abs().max_element() <= 1e-3 * there.max_element(), "{name}: {a} {b}: {there} {back}");
         }
     }
     // Through an interface, radiance over the squared index is what is kept.
@@ -112,10 +112,9 @@ fn glossy_albedo_is_near_the_integral_of_the_other_lobes() {
                 let (wi, query) = (direction(cos, 0.1), Query { lobes: Lobes::NON_DIFFUSE, roughness_scale });
                 let (ours, exact) = (bsdf.glossy_albedo(&surface([0.3, 0.6]), wi, query), albedo(&bsdf, wi, query));
                 // One alpha stands for an anisotropic pair.
-                let tolerance =
-                    if ["blend", "principled_metal"].contains(name) || name.ends_with("anisotropic") { 0.12 } else { 0.04 };
                 let error = ((ours - exact) / exact).abs().max_element();
-                assert!(error < tolerance, "{name} {cos} x {roughness_scale}: {ours} {exact}");
+                // One alpha stands for an anisotropic pair; the Fresnel term is taken at one cosine.
+                assert!(error < 0.05, "{name} {cos} x {roughness_scale}: {ours} {exact}");
             }
         }
     }

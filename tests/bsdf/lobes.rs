@@ -127,7 +127,9 @@ fn one_sided_models_are_black_behind_and_two_sided_ones_are_not() {
     let s = surface([0.3, 0.6]);
     let (one, two) = (model("plastic"), model("twosided_plastic"));
     assert!(!one.is_two_sided() && two.is_two_sided());
-    let down = |v: Vec3| v.with_z(-v.z);
+    fn down(v: Vec3) -> Vec3 {
+        Vec3::new(v.x, v.y, -v.z)
+    }
     for (wi, wo) in pairs() {
         let (wi, wo) = (wi.with_z(wi.z.abs()), wo.with_z(wo.z.abs()));
         assert_eq!(one.eval(&s, down(wi), down(wo), Query::default()), Rgb::ZERO);

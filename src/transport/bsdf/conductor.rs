@@ -104,7 +104,7 @@ impl Scatter for RoughConductor {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        let (energy, cos) = lobe_albedo(self.distribution, self.facets(s, query).mean_alpha(), wi.z);
+        let (energy, cos) = lobe_albedo(self.distribution, self.facets(s, query).alpha_towards(wi), wi.z);
         self.fresnel(s, cos) * energy
     }
 

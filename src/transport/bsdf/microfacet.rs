@@ -100,6 +100,12 @@ impl Microfacets {
         }
     }
 
+    /// The isotropic alpha that scatters most alike for a viewer at `w`: that along the view at grazing angles, where it
+    /// sets the shadowing, the geometric mean from above.
+    pub fn alpha_towards(&self, w: Vec3) -> f32 {
+        ((self.alpha * w.truncate()).length_squared() + self.alpha.x * self.alpha.y * w.z * w.z).sqrt()
+    }
+
     /// Geometric mean of the two alphas.
     pub fn mean_alpha(&self) -> f32 {
         (self.alpha.x * self.alpha.y).sqrt()

@@ -282,21 +282,23 @@ impl Scatter for Principled {
         if wo.z > 0.0 { 1.0 } else { 0.0 }
     }
 
-    /// By quadrature over 4 x 8 directions: the lobes are smooth.
+    /// By quadrature: 4 Gauss-Legendre nodes in cos², even in projected solid angle, by 8 azimuths.
     fn diffuse_albedo(&self, s: &Surface, wi: Vec3) -> Rgb {
+        const NODES: [(f32, f32); 4] =
+            [(0.069_431_84, 0.173_927_4), (0.330_009_5, 0.326_072_6), (0.669_990_5, 0.326_072_6), (0.930_568_2, 0.173_927_4)];
+        const AZIMUTHS: u32 = 8;
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        const SIDE: usize = 4;
         let p = self.at(s, Query::default());
         let mut sum = Rgb::ZERO;
-        for k in 0..2 * SIDE * SIDE {
-            // Even steps in cos² are even steps of projected solid angle.
-            let cos2 = ((k % SIDE) as f32 + 0.5) / SIDE as f32;
-            let wo = direction(cos2.sqrt(), ((k / SIDE) as f32 + 0.5) / (2 * SIDE) as f32);
-            sum += self.diffuse(s, &p, wi, wo, (wi + wo).normalize_or_zero()) / wo.z;
+        for (cos2, weight) in NODES {
+            for k in 0..AZIMUTHS {
+                let wo = direction(cos2.sqrt(), (k as f32 + 0.5) / AZIMUTHS as f32);
+                sum += self.diffuse(s, &p, wi, wo, (wi + wo).normalize_or_zero()) * (weight / wo.z);
+            }
         }
-        sum * (PI / (2 * SIDE * SIDE) as f32)
+        sum * (PI / AZIMUTHS as f32)
     }
 
     fn glossy_albedo(&self, s: &Surface, wi: Vec3, query: Query) -> Rgb {
@@ -304,7 +306,7 @@ impl Scatter for Principled {
         if wi.z <= 0.0 {
             return if self.is_transmissive() { p.base * p.glass } else { Rgb::ZERO };
         }
-        let (energy, cos) = lobe_albedo(Distribution::Ggx, p.facets.mean_alpha(), wi.z);
+        let (energy, cos) = lobe_albedo(Distribution::Ggx, p.facets.alpha_towards(wi), wi.z);
         let f = fresnel::dielectric(cos, self.params.eta).r;
         // The clearcoat's lobe integrates to about its Fresnel term times its strength.
         let coat = p.clearcoat * CLEARCOAT_STRENGTH * self.schlick_from(Rgb::splat(CLEARCOAT_F0), wi.z);
