@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 /// Deepest chain of `include`s.
 const MAX_INCLUDES: usize = 16;
+/// Most files of a scene: includes that include twice would multiply without end.
+const MAX_FILES: usize = 1000;
 /// Most elements and attributes in one file.
 const MAX_NODES: u32 = 20_000_000;
 
@@ -21,6 +23,7 @@ pub fn parse(path: &Path, defines: &[(String, String)]) -> Result<Vec<Param>> {
         values: defines.to_vec(),
         folders: Folders::of(path),
         open: Vec::new(),
+        files: 0,
         aliases: Vec::new(),
         children: Vec::new(),
     };
@@ -37,6 +40,8 @@ struct Reader {
     folders: Folders,
     /// Files being read, outermost first: to see an include that goes in circles.
     open: Vec<PathBuf>,
+    /// Files read so far.
+    files: usize,
     /// (id, its second name, where).
     aliases: Vec<(String, String, Location)>,
     children: Vec<Param>,
@@ -104,6 +109,10 @@ impl Reader {
                 }
                 if self.open.len() >= MAX_INCLUDES {
                     return Err(at.error(format!("includes are nested more than {MAX_INCLUDES} deep")));
+                }
+                self.files += 1;
+                if self.files > MAX_FILES {
+                    return Err(at.error(format!("more than {MAX_FILES} files are included")));
                 }
                 self.file(&file)?;
             }

@@ -187,9 +187,6 @@ impl<'a> Builder<'a> {
     fn metal(&mut self, p: &mut Params<'a>) -> Result<Conductor> {
         let specular_reflectance = self.textured(p, "specular_reflectance", 1.0)?;
         let outside = index_of_refraction(p, "ext_eta", "vacuum")?;
-        if outside <= 0.0 {
-            return Err(p.at("ext_eta").error(format!("ext_eta = {outside}: expected more than 0")));
-        }
         let given = p.has("eta") || p.has("k");
         let (eta, k) = match p.text("material")? {
             Some("none") | None if !given => (Rgb::ZERO, Rgb::ZERO),
@@ -251,5 +248,9 @@ fn index_of_refraction(p: &mut Params, name: &str, default: &str) -> Result<f32>
         return ior::dielectric(medium)
             .ok_or_else(|| param.at.error(format!("unknown medium \"{medium}\": expected one of {}", known())));
     }
-    number_of(param, p.node)?.ok_or_else(|| wrong(param, p.node, "a number or a medium's name"))
+    match number_of(param, p.node)? {
+        Some(ior) if ior > 0.0 => Ok(ior),
+        Some(ior) => Err(param.at.error(format!("{name} = {ior}: expected more than 0"))),
+        None => Err(wrong(param, p.node, "a number or a medium's name")),
+    }
 }
