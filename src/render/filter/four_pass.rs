@@ -4,13 +4,16 @@
 //! halved covariances, so that a neighbour round the corner of an edge is still reached.
 //! Ours: a pass steps a pixel at a time along the axis nearest its direction and reads the two pixels nearest the line, each with its own range weight.
 
-use super::{FilterInput, FilterParams, Method, NOT_GLOSSY, confidence, in_range, principal};
+use super::{FilterInput, FilterParams, Method, NOT_GLOSSY, confidence, principal};
 use crate::math::Rgb;
-use glam::{Vec2, Vec4, Vec4Swizzles};
+use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 /// Below this standard deviation (pixels) a pass changes nothing: the nearest neighbour's weight is 3e-6.
 const MIN_SIGMA: f32 = 0.2;
+
+/// Rows of a task, and columns that it goes through at a time: upright lines then stay in the cache.
+const TILE: (usize, usize) = (32, 64);
 
 /// A pixel's own kernel.
 #[derive(Clone, Copy)]
@@ -18,6 +21,16 @@ struct Axes {
     major: Vec2,
     /// Standard deviations of one pass along the major and the minor axis, for a Gaussian of the covariance itself.
     sigma: Vec2,
+}
+
+/// What a pass reads of a pixel, side by side in memory.
+#[derive(Clone, Copy)]
+struct Tap {
+    /// Colour times weight, and the weight.
+    value: Vec4,
+    normal: Vec3,
+    depth: f32,
+    material: u32,
 }
 
 /// Filters by a sum of Gaussians, each a (share, variance over the covariance).
@@ -31,22 +44,24 @@ pub fn filter(input: &FilterInput, params: &FilterParams, gaussians: &[(f32, f32
             Axes { major, sigma: Vec2::new((a / split).sqrt(), (b / split).sqrt()) }
         })
         .collect();
-    let start: Vec<Vec4> = (0..count)
+    let start: Vec<Tap> = (0..count)
         .into_par_iter()
         .map(|i| {
             let w = confidence(input, i, params);
-            if w > 0.0 { (input.color[i] * w).extend(w) } else { Vec4::ZERO }
+            let value = if w > 0.0 { (input.color[i] * w).extend(w) } else { Vec4::ZERO };
+            Tap { value, normal: input.normal[i], depth: input.depth[i], material: input.material[i] }
         })
         .collect();
     let mut out = vec![Rgb::ZERO; count];
+    let (mut from, mut to) = (start.clone(), start.clone());
     for &(share, variance) in gaussians {
-        let mut buffer = start.clone();
+        from.copy_from_slice(&start);
         for number in 0..2 * split as usize {
-            let along_major = number % 2 == 0;
-            buffer = pass(input, params, &axes, &buffer, along_major, variance.sqrt());
+            pass(input.width, params, &axes, &from, &mut to, (number % 2 == 0, variance.sqrt()));
+            std::mem::swap(&mut from, &mut to);
         }
-        out.par_iter_mut().zip(&buffer).zip(input.color).for_each(|((o, b), &c)| {
-            *o += if b.w > 0.0 { b.xyz() / b.w * share } else { c * share };
+        out.par_iter_mut().zip(&from).zip(input.color).for_each(|((o, Tap { value, .. }), &c)| {
+            *o += if value.w > 0.0 { value.xyz() / value.w * share } else { c * share };
         });
     }
     // Bit for bit what came in, where nothing was to be filtered.
@@ -58,54 +73,69 @@ pub fn filter(input: &FilterInput, params: &FilterParams, gaussians: &[(f32, f32
     out
 }
 
-/// One pass. Weighted colour and weight are carried alike; each pixel's result is their mean over its line.
-fn pass(input: &FilterInput, params: &FilterParams, axes: &[Axes], from: &[Vec4], along_major: bool, scale: f32) -> Vec<Vec4> {
-    let (w, h) = (input.width as i32, input.height as i32);
-    let pixel = |i: usize| {
-        let own = from[i];
-        let Axes { major, sigma } = axes[i];
-        let (direction, sigma) = if along_major { (major, sigma.x) } else { (major.perp(), sigma.y) };
-        let sigma = (sigma * scale).min(params.max_radius / params.radius_sigmas);
-        if input.material[i] == NOT_GLOSSY || sigma < MIN_SIGMA {
-            return own;
-        }
-        let (x, y) = (i as i32 % w, i as i32 / w);
-        let upright = direction.y.abs() > direction.x.abs();
-        let (long, short) = if upright { (direction.y, direction.x) } else { (direction.x, direction.y) };
-        let slope = short / long;
-        // Length of one step along the line.
-        let step = (1.0 + slope * slope).sqrt();
-        let reach = (params.radius_sigmas * sigma / step) as i32;
-        // exp(-(k step)² / 2σ²) by two products a step.
-        let ratio = (-(step / sigma).powi(2)).exp();
-        let first = (-0.5 * (step / sigma).powi(2)).exp();
-        let (mut sum, mut total) = (own, 1.0);
-        for side in [-1, 1] {
-            let (mut g, mut factor) = (1.0, first);
-            for k in 1..=reach {
-                g *= factor;
-                factor *= ratio;
-                let across = (side * k) as f32 * slope;
-                let low = across.floor();
-                let fraction = across - low;
-                let mut tap = |offset: i32, weight: f32| {
-                    let (xx, yy) = if upright { (x + offset, y + side * k) } else { (x + side * k, y + offset) };
-                    if xx < 0 || yy < 0 || xx >= w || yy >= h {
-                        return;
-                    }
-                    let j = (yy * w + xx) as usize;
-                    if in_range(input, i, j, params) {
-                        sum += from[j] * weight;
-                        total += weight;
-                    }
-                };
-                tap(low as i32, g * (1.0 - fraction));
-                if fraction > 0.0 {
-                    tap(low as i32 + 1, g * fraction);
+/// One pass: each pixel's value becomes the mean over its line. Weighted colour and weight are carried alike.
+/// `kernel` says whether the line is the major axis, and what multiplies its standard deviation.
+fn pass(width: usize, params: &FilterParams, axes: &[Axes], from: &[Tap], to: &mut [Tap], kernel: (bool, f32)) {
+    let (rows, columns) = TILE;
+    to.par_chunks_mut(width * rows).enumerate().for_each(|(strip, out)| {
+        let first = strip * rows * width;
+        for left in (0..width).step_by(columns) {
+            for row in 0..out.len() / width {
+                for x in left..(left + columns).min(width) {
+                    let at = row * width + x;
+                    out[at].value = line_mean(width, params, axes[first + at], from, first + at, kernel);
                 }
             }
         }
-        sum / total
-    };
-    (0..from.len()).into_par_iter().with_min_len(input.width).map(pixel).collect()
+    });
+}
+
+/// The mean over one pixel's line.
+fn line_mean(width: usize, params: &FilterParams, axes: Axes, from: &[Tap], i: usize, (along_major, scale): (bool, f32)) -> Vec4 {
+    let own = from[i];
+    let Axes { major, sigma } = axes;
+    let (direction, sigma) = if along_major { (major, sigma.x) } else { (major.perp(), sigma.y) };
+    let sigma = (sigma * scale).min(params.max_radius / params.radius_sigmas);
+    if own.material == NOT_GLOSSY || sigma < MIN_SIGMA {
+        return own.value;
+    }
+    let (w, h) = (width as i32, (from.len() / width) as i32);
+    let (x, y) = (i as i32 % w, i as i32 / w);
+    // `long` is the axis nearest the line, `short` the other one.
+    let upright = direction.y.abs() > direction.x.abs();
+    let (long, short) = if upright { ((y, h, w), (x, w, 1)) } else { ((x, w, 1), (y, h, w)) };
+    let slope = if upright { direction.x / direction.y } else { direction.y / direction.x };
+    // Length of one step along the line.
+    let step = (1.0 + slope * slope).sqrt();
+    let reach = (params.radius_sigmas * sigma / step) as i32;
+    // exp(-(k step)² / 2σ²) by two products a step.
+    let ratio = (-(step / sigma).powi(2)).exp();
+    let first = (-0.5 * (step / sigma).powi(2)).exp();
+    let (mut sum, mut total) = (own.value, 1.0);
+    for side in [-1, 1] {
+        let room = if side < 0 { long.0 } else { long.1 - 1 - long.0 };
+        let (mut g, mut factor) = (1.0, first);
+        for k in 1..=reach.min(room) {
+            g *= factor;
+            factor *= ratio;
+            let across = (side * k) as f32 * slope;
+            let low = across.floor();
+            let fraction = across - low;
+            let low = low as i32;
+            let on_axis = i as i32 + side * k * long.2;
+            for (offset, weight) in [(low, g * (1.0 - fraction)), (low + 1, g * fraction)] {
+                if (short.0 + offset) as u32 >= short.1 as u32 {
+                    continue;
+                }
+                let tap = &from[(on_axis + offset * short.2) as usize];
+                let near = (own.depth - tap.depth).abs() < params.depth_threshold;
+                let facing = own.normal.dot(tap.normal) > params.min_normal_cos;
+                if near & facing & (own.material == tap.material) {
+                    sum += tap.value * weight;
+                    total += weight;
+                }
+            }
+        }
+    }
+    sum / total
 }
