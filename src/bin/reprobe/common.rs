@@ -38,8 +38,11 @@ pub struct Common {
     pub defines: Vec<String>,
     /// The scene of the last stage: stages run in one process load it once.
     #[arg(skip)]
-    opaque: Arc<Mutex<Option<(PathBuf, Arc<World>)>>>,
+    opaque: Arc<SceneSlot>,
 }
+
+/// A scene's file and its opaque part.
+type SceneSlot = Mutex<Option<(PathBuf, Arc<World>)>>;
 
 /// `--shard I/N`.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -39,11 +39,10 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     let folder = args.probes.as_ref().context("--method glossy-probes needs --probes DIR, written by bake-probes")?;
     let file = args.curvature.as_ref().context("--method glossy-probes needs --curvature FILE, written by curvature")?;
     let mut probes = ProbeStore::open(folder, scene, PROBE_CACHE)?;
-    if let Some(views) = &probes.set.views {
-        if *views != Views::new(&cameras, params.supersample, &params.gather) {
-            let message = "its texels were baked for other views (another path, size, --supersample or gather parameters)";
-            bail!("{}: {message}; run bake-probes again for these, or without --for-path", folder.display());
-        }
+    let serves = |views: &Views| *views == Views::new(&cameras, params.supersample, &params.gather);
+    if !probes.set.views.as_ref().is_none_or(serves) {
+        let message = "its texels were baked for other views (another path, size, --supersample or gather parameters)";
+        bail!("{}: {message}; run bake-probes again for these, or without --for-path", folder.display());
     }
     let curvature = curvature_file::read(file, scene.geometry.positions.len(), &scene.hash)?;
     let lightmap = args.lightmap.as_ref().map(|path| LightMap::load(path, scene)).transpose()?;
