@@ -105,13 +105,22 @@ fn succeeds(folder: &Path, args: &[&str]) -> serde_json::Value {
     serde_json::from_str(&out).unwrap_or_default()
 }
 
+const PATH: &str = r#"{"fov": 70, "size": [64, 32], "frames": [
+    {"origin": [-1, 0, 0.5], "target": [1, 0, 0], "up": [0, 1, 0]},
+    {"origin": [0, 0.25, 0.5], "target": [1, 0, 0], "up": [0, 1, 0]}]}"#;
+
 const RESMAP: [&str; 8] = ["resmap", "scene.xml", "--probes", "probes.json", "--size", "64x32", "--json", "-o"];
 const QHMAP: [&str; 5] = ["qhmap", "--size", "128x64", "--json", "-o"];
 
 /// All three stages in a folder, with `threads` threads.
 fn make(folder: &Path, threads: &str) {
     std::fs::write(folder.join("scene.xml"), scene("")).unwrap();
-    succeeds(folder, &["place-probes", "scene.xml", "--grid", "2x1x2", "-o", "probes.json", "--threads", threads]);
+    std::fs::write(folder.join("path.json"), PATH).unwrap();
+    let path = ["--path", "path.json"];
+    let probes = ["place-probes", "scene.xml", "--grid", "2x1x2", "-o", "probes.json", "--threads", threads, "--json"];
+    let figures = succeeds(folder, &[&probes[..], &path].concat());
+    // The two cameras' box and half a metre around it.
+    assert_eq!(figures["bounds"], serde_json::json!([[-1.5, -0.5, 0.0], [0.5, 0.75, 1.0]]));
     succeeds(folder, &[&RESMAP[..], &["resmap", "--threads", threads]].concat());
     succeeds(folder, &[&QHMAP[..], &["qhmap", "resmap", "--threads", threads]].concat());
 }

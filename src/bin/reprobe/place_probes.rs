@@ -7,6 +7,7 @@ use reprobe::io::Provenance;
 use reprobe::probe::placement::{Density, ProbeGrid};
 use reprobe::probe::reach::{ReachParams, blocked, reach};
 use reprobe::scene::Scene;
+use reprobe::scene::path::load as load_path;
 use reprobe::transport::World;
 use serde_json::json;
 use std::path::PathBuf;
@@ -71,7 +72,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     if left_out > 0 {
         eprintln!("reprobe: warning: {left_out} transmissive shapes are left out of the probes");
     }
-    let cameras = cameras(args, &world.scene)?;
+    let cameras = cameras(args, &world.scene, common)?;
     let params = ReachParams { margin: args.margin, ..ReachParams::default() };
     let (lower, upper) = match args.bounds {
         Some([x0, y0, z0, x1, y1, z1]) => (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1)),
@@ -105,9 +106,9 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
 }
 
 /// Where the camera stands: along the path, or the scene's own sensor.
-fn cameras(args: &Args, scene: &Scene) -> anyhow::Result<Vec<Vec3>> {
-    match &args.path {
-        Some(path) => bail!("{}: camera paths: not yet", path.display()),
-        None => Ok(scene.sensor.iter().map(|c| c.position()).collect()),
-    }
+fn cameras(args: &Args, scene: &Scene, common: &Common) -> anyhow::Result<Vec<Vec3>> {
+    Ok(match &args.path {
+        Some(path) => load_path(path, scene.sensor.as_ref(), common.unit_scale)?.iter().map(|c| c.position()).collect(),
+        None => scene.sensor.iter().map(|c| c.position()).collect(),
+    })
 }
