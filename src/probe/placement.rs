@@ -21,6 +21,8 @@ pub enum Density {
     Counts([u32; 3]),
     /// A probe every so many metres along each axis, the grid centred in the box.
     Spacing(f32),
+    /// About so many probes in all, as far apart along one axis as along another.
+    Count(u32),
 }
 
 impl Default for Density {
@@ -73,6 +75,11 @@ impl ProbeGrid {
             Density::Spacing(s) if s.is_finite() && s > 0.0 => {
                 ((extent / s).round().min(Vec3::splat(1e6)).as_uvec3().max(UVec3::ONE), Vec3::splat(s))
             }
+            Density::Count(n) if n > 0 => {
+                let counts = UVec3::from(even_counts(extent, n));
+                (counts, extent / counts.as_vec3())
+            }
+            Density::Count(n) => return Err(Error::Request(format!("{n} probes: expected at least 1"))),
             Density::Spacing(s) => return Err(Error::Request(format!("spacing {s}: expected a positive number of metres"))),
         };
         check_counts(counts.to_array()).map_err(Error::Request)?;
@@ -185,9 +192,30 @@ fn check_counts(counts: [u32; 3]) -> std::result::Result<(), String> {
     Ok(())
 }
 
+/// The counts along x, y and z whose product comes nearest to `count` among those that a cubic spacing gives.
+fn even_counts(extent: Vec3, count: u32) -> [u32; 3] {
+    let extent = extent.max(Vec3::splat(extent.max_element() * 1e-3));
+    let at = |spacing: f32| (extent / spacing).round().max(Vec3::ONE).as_uvec3().to_array();
+    let product = |c: [u32; 3]| c.iter().map(|&n| u64::from(n)).product::<u64>();
+    // Around the spacing that would fit exactly, finely enough to meet each rounding.
+    let ideal = (extent.element_product() / count as f32).cbrt().max(f32::MIN_POSITIVE);
+    (0..200).map(|i| at(ideal * (0.5 + i as f32 * 0.005))).min_by_key(|&c| product(c).abs_diff(u64::from(count))).unwrap_or([1; 3])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_count_gives_an_even_grid_of_about_as_many() {
+        assert_eq!(even_counts(Vec3::splat(3.0), 64), [4, 4, 4]);
+        assert_eq!(even_counts(Vec3::new(4.0, 2.0, 2.0), 16), [4, 2, 2]);
+        assert_eq!(even_counts(Vec3::new(5.0, 0.0, 0.0), 7), [7, 1, 1]);
+        for n in [1, 12, 64, 252] {
+            let [x, y, z] = even_counts(Vec3::new(3.1, 2.2, 4.3), n);
+            assert!((x * y * z).abs_diff(n) <= n / 8, "{n}: {x}x{y}x{z}");
+        }
+    }
 
     fn grid(density: Density) -> ProbeGrid {
         let provenance = Provenance::new("place-probes", "abc", 0, &density);

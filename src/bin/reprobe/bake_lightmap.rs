@@ -28,7 +28,10 @@ pub struct Args {
     /// Samples a texel
     #[arg(long, value_name = "N", default_value_t = BakeParams::default().spp, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: u32,
-    /// Edge of a texel, metres [default: what gives the surfaces 2 million texels]
+    /// Texels that the surfaces get in all
+    #[arg(long, value_name = "N", default_value_t = AtlasParams::default().budget, conflicts_with = "texel")]
+    texels: u32,
+    /// Edge of a texel, metres, in place of --texels
     #[arg(long, value_name = "M")]
     texel: Option<f32>,
     /// Bake blocks I, I+N, I+2N, ... only; the shard that completes them writes the map
@@ -46,12 +49,9 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     if args.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
         bail!("-o {}: expected a file name that ends in .exr", args.output.display());
     }
-    let (world, left_out) = World::opaque(common.load_scene(&args.scene)?);
-    if left_out > 0 {
-        eprintln!("reprobe: warning: {left_out} transmissive shapes are left out of the light map");
-    }
-    let params =
-        BakeParams { spp: args.spp, atlas: AtlasParams { texel: args.texel, ..Default::default() }, ..Default::default() };
+    let world = common.opaque_world(&args.scene)?;
+    let atlas = AtlasParams { texel: args.texel, budget: args.texels };
+    let params = BakeParams { spp: args.spp, atlas, ..Default::default() };
     let plan = Plan::new(&world, &params, common.seed)?;
     let atlas = &plan.atlas;
     let provenance = Provenance::new("bake-lightmap", &world.scene.hash, common.seed, &params);

@@ -30,7 +30,8 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     if args.no_tessellation {
         params.tessellation.max_triangles = 0;
     }
-    let scene = common.load_scene(&args.scene)?;
+    let world = common.opaque_world(&args.scene)?;
+    let scene = &world.scene;
     let start = Instant::now();
     let map = curvature(&scene.geometry, &params, &common.progress());
     let seconds = start.elapsed().as_secs_f64();

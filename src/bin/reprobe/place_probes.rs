@@ -8,7 +8,6 @@ use reprobe::probe::placement::{Density, ProbeGrid};
 use reprobe::probe::reach::{ReachParams, blocked, reach};
 use reprobe::scene::Scene;
 use reprobe::scene::path::load as load_path;
-use reprobe::transport::World;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -30,8 +29,11 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Probes along x, y and z [default: 7x6x6]
-    #[arg(long, value_name = "XxYxZ", value_parser = parse_grid, conflicts_with = "spacing")]
+    #[arg(long, value_name = "XxYxZ", value_parser = parse_grid, conflicts_with_all = ["spacing", "count"])]
     grid: Option<[u32; 3]>,
+    /// About so many probes, evenly spaced
+    #[arg(long, value_name = "N", conflicts_with = "spacing")]
+    count: Option<u32>,
     /// Distance of neighbours, metres
     #[arg(long, value_name = "M")]
     spacing: Option<f32>,
@@ -63,15 +65,13 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     if !(args.margin.is_finite() && args.margin >= 0.0) {
         bail!("--margin {}: expected metres, not negative", args.margin);
     }
-    let density = match (args.spacing, args.grid) {
-        (Some(s), _) => Density::Spacing(s),
-        (None, Some(counts)) => Density::Counts(counts),
-        (None, None) => Density::default(),
+    let density = match (args.spacing, args.grid, args.count) {
+        (Some(s), ..) => Density::Spacing(s),
+        (_, Some(counts), _) => Density::Counts(counts),
+        (.., Some(n)) => Density::Count(n),
+        _ => Density::default(),
     };
-    let (world, left_out) = World::opaque(common.load_scene(&args.scene)?);
-    if left_out > 0 {
-        eprintln!("reprobe: warning: {left_out} transmissive shapes are left out of the probes");
-    }
+    let world = common.opaque_world(&args.scene)?;
     let cameras = cameras(args, &world.scene, common)?;
     let params = ReachParams { margin: args.margin, ..ReachParams::default() };
     let (lower, upper) = match args.bounds {

@@ -8,7 +8,6 @@ use reprobe::probe::placement::ProbeGrid;
 use reprobe::probe::resmap::{ResmapParams, resolution_map};
 use reprobe::probe::seen::SeenBuffers;
 use reprobe::probe::set::{ProbeSet, numbered};
-use reprobe::transport::World;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -59,11 +58,8 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     };
     params.validate()?;
     let grid = ProbeGrid::read(&args.probes)?;
-    let (world, left_out) = World::opaque(common.load_scene(&args.scene)?);
+    let world = common.opaque_world(&args.scene)?;
     grid.provenance.check_scene(&args.probes, &world.scene.hash)?;
-    if left_out > 0 {
-        eprintln!("reprobe: warning: {left_out} transmissive shapes are left out of the probes");
-    }
     let start = Instant::now();
     let provenance =
         Provenance::new("resmap", &world.scene.hash, common.seed, &params).with_input("probes", hash_file(&args.probes)?);

@@ -225,7 +225,7 @@ fn stages(args: &Args, common: &Common) -> Vec<Stage> {
         bake,
         stage("bake-lightmap")
             .option("--spp", args.lightmap_spp.unwrap_or(preset.lightmap_spp))
-            .option("--max-texels", preset.lightmap_texels)
+            .optional("--texels", args.texel.is_none().then_some(preset.lightmap_texels))
             .optional("--texel", args.texel)
             .option("--output", out("lightmap.exr").display()),
         view(stage("render-path"))
