@@ -199,7 +199,10 @@ fn even_counts(extent: Vec3, count: u32) -> [u32; 3] {
     let product = |c: [u32; 3]| c.iter().map(|&n| u64::from(n)).product::<u64>();
     // Around the spacing that would fit exactly, finely enough to meet each rounding.
     let ideal = (extent.element_product() / count as f32).cbrt().max(f32::MIN_POSITIVE);
-    (0..200).map(|i| at(ideal * (0.5 + i as f32 * 0.005))).min_by_key(|&c| product(c).abs_diff(u64::from(count))).unwrap_or([1; 3])
+    (0..200)
+        .map(|i| at(ideal * (0.5 + i as f32 * 0.005)))
+        .min_by_key(|&c| product(c).abs_diff(u64::from(count)))
+        .unwrap_or([1; 3])
 }
 
 #[cfg(test)]
