@@ -19,14 +19,17 @@ pub const GUTTER: u32 = 1;
 /// Most texels an atlas may have, gutters and gaps included.
 pub const MAX_TEXELS: u64 = 1 << 26;
 
+/// How often the texel grows when small charts take the atlas past its budget.
+const MORE_TRIES: u32 = 3;
+
 /// How finely surfaces are covered.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AtlasParams {
     /// Edge of a texel, metres; by default what spends `budget`.
     pub texel: Option<f32>,
-    /// Texels that the surfaces get in all when `texel` is not given. Ours: 2 million, a texel of some 8 mm in a room
-    /// of 130 m² of surfaces.
+    /// About how many texels the surfaces get in all when `texel` is not given; backs come on top. Ours: 2 million,
+    /// a texel of some 8 mm in a room of 130 m² of surfaces.
     pub budget: u32,
 }
 
@@ -68,13 +71,18 @@ impl Atlas {
             (0..geometry.objects.len()).into_par_iter().map(|o| keep(o).then(|| adjacency::adjacency(geometry, o))).collect();
         // Summed in file order: the same bits for any number of threads.
         let area: f64 = adjacencies.iter().flatten().flat_map(|a| &a.areas).map(|&a| f64::from(a)).sum();
-        let texel = texel_size(area, params)?;
-        if area / f64::from(texel).powi(2) > MAX_TEXELS as f64 {
-            return Err(too_many(texel, area / f64::from(texel).powi(2)));
+        let mut texel = texel_size(area, params)?;
+        let mut charts = cut(geometry, &adjacencies, area, texel)?;
+        for _ in 0..MORE_TRIES {
+            // Charts are whole texels wide, which counts where they are small.
+            let excess =
+                charts.iter().map(|c| f64::from(c.size[0]) * f64::from(c.size[1])).sum::<f64>() / f64::from(params.budget);
+            if params.texel.is_some() || excess < 1.25 {
+                break;
+            }
+            texel = two_digits(f64::from(texel) * excess.sqrt());
+            charts = cut(geometry, &adjacencies, area, texel)?;
         }
-        let per_object: Vec<Vec<Chart>> =
-            adjacencies.par_iter().map(|a| a.as_ref().map_or_else(Vec::new, |a| charts_of(geometry, a, texel))).collect();
-        let mut charts: Vec<Chart> = per_object.into_iter().flatten().collect();
         let size = place(&mut charts, texel)?;
         let mut triangle_chart = vec![NONE; geometry.triangles.len()];
         for (i, chart) in charts.iter().enumerate() {
@@ -105,9 +113,24 @@ fn texel_size(area: f64, params: &AtlasParams) -> Result<f32> {
     if !(area.is_finite() && area > 0.0) {
         return Ok(1.0);
     }
-    let exact = (area / f64::from(params.budget.max(1))).sqrt();
-    let digit = 10f64.powf(exact.log10().floor() - 1.0);
-    Ok(((exact / digit).ceil() * digit) as f32)
+    Ok(two_digits((area / f64::from(params.budget.max(1))).sqrt()))
+}
+
+/// Rounds up to two digits.
+fn two_digits(x: f64) -> f32 {
+    let digit = 10f64.powf(x.log10().floor() - 1.0);
+    ((x / digit - 1e-6).ceil() * digit) as f32
+}
+
+/// The charts of all objects, in their order.
+fn cut(geometry: &Geometry, adjacencies: &[Option<Adjacency>], area: f64, texel: f32) -> Result<Vec<Chart>> {
+    let texels = area / f64::from(texel).powi(2);
+    if texels > MAX_TEXELS as f64 {
+        return Err(too_many(texel, texels));
+    }
+    let per_object: Vec<Vec<Chart>> =
+        adjacencies.par_iter().map(|a| a.as_ref().map_or_else(Vec::new, |a| charts_of(geometry, a, texel))).collect();
+    Ok(per_object.into_iter().flatten().collect())
 }
 
 fn too_many(texel: f32, texels: f64) -> Error {

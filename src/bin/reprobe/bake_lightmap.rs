@@ -1,6 +1,6 @@
 //! `reprobe bake-lightmap`.
 
-use crate::common::{Common, Outcome};
+use crate::common::{Common, Outcome, Shard, parse_shard};
 use anyhow::bail;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::parts::Folder;
@@ -28,20 +28,15 @@ pub struct Args {
     /// Samples a texel
     #[arg(long, value_name = "N", default_value_t = BakeParams::default().spp, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: u32,
-    /// Texels that the surfaces get in all
-    #[arg(long, value_name = "N", default_value_t = AtlasParams::default().budget, conflicts_with = "texel")]
-    texels: u32,
     /// Edge of a texel, metres, in place of --texels
     #[arg(long, value_name = "M")]
     texel: Option<f32>,
+    /// About how many texels the surfaces get in all
+    #[arg(long, value_name = "N", default_value_t = AtlasParams::default().budget, conflicts_with = "texel", value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
+    texels: u32,
     /// Bake blocks I, I+N, I+2N, ... only; the shard that completes them writes the map
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
-    shard: Option<(u32, u32)>,
-}
-
-fn parse_shard(text: &str) -> Result<(u32, u32), String> {
-    let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    parsed.filter(|(i, n)| i < n).ok_or_else(|| "expected I/N with I from 0 to N-1, like 0/4".into())
+    shard: Option<Shard>,
 }
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
@@ -50,6 +45,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         bail!("-o {}: expected a file name that ends in .exr", args.output.display());
     }
     let world = common.opaque_world(&args.scene)?;
+    let loaded = began.elapsed().as_secs_f64();
     let atlas = AtlasParams { texel: args.texel, budget: args.texels };
     let params = BakeParams { spp: args.spp, atlas, ..Default::default() };
     let plan = Plan::new(&world, &params, common.seed)?;
@@ -57,8 +53,8 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let provenance = Provenance::new("bake-lightmap", &world.scene.hash, common.seed, &params);
     let store = Folder::new(&parts_folder(&args.output), &serde_json::to_string(&provenance)?);
 
-    let planned = began.elapsed().as_secs_f64();
-    let mine = |b: u32| args.shard.is_none_or(|(i, n)| b % n == i);
+    let planned = began.elapsed().as_secs_f64() - loaded;
+    let mine = |b: u32| args.shard.is_none_or(|s| s.has(b));
     let kept = plan.run(&store, &mine, &common.progress())?;
     let missing = (0..plan.blocks()).filter(|&b| !mine(b) && !plan.has(&store, b)).count();
     if missing == 0 {
@@ -82,7 +78,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         figures: json!({
             "size": atlas.size, "charts": atlas.charts.len(), "texel": atlas.texel, "texels": plan.len(), "backs": plan.backs(),
             "spp": args.spp, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
-            "seconds_atlas": planned, "seconds": seconds,
+            "seconds_load": loaded, "seconds_plan": planned, "seconds": seconds,
         }),
         ..Outcome::default()
     })
