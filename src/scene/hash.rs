@@ -1,4 +1,5 @@
-//! What a scene is, in one hash: its tree and the bytes of its files, but not their names, nor how it is written down.
+//! What a scene is, in one hash: its tree and the bytes of its files, but not their names, nor how it is written down, nor its
+//! cameras, films, integrators and samplers.
 
 use super::assets::{Assets, walk};
 use super::params::Ids;
@@ -47,6 +48,10 @@ impl Tree<'_> {
                 },
                 _ => continue,
             };
+            // Where it is seen from and how it is sampled is not the scene: a moved camera spoils no bake.
+            if matches!(node.kind, Kind::Sensor | Kind::Film | Kind::Integrator | Kind::Other) {
+                continue;
+            }
             hasher.update(tag);
             // Only a texture is told by its name; other children by what they are.
             if node.kind == Kind::Texture {

@@ -1,0 +1,217 @@
+//! `run`, and what its stages do when they are interrupted or given what does not fit.
+
+use reprobe::io::ExrImage;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SCENE: &str = r#"<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="70"/>
+      <transform name="to_world"><lookat origin="0, 0, 1.5" target="0, -0.5, 0" up="0, 1, 0"/></transform></sensor>
+    <bsdf type="twosided" id="wall"><bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.5, 0.4"/></bsdf></bsdf>
+    <shape type="cube"><transform name="to_world"><scale value="2"/></transform><ref id="wall"/></shape>
+    <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><translate y="-1"/></transform>
+      <bsdf type="roughplastic"><float name="alpha" value="0.15"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0" y="-0.6" z="0"/><float name="radius" value="0.35"/>
+      <bsdf type="conductor"/></shape>
+    <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="90"/><scale value="0.5"/><translate y="1.9"/></transform>
+      <emitter type="area"><rgb name="radiance" value="12, 11, 10"/></emitter></shape>
+    </scene>"#;
+
+const PATH: &str = r#"{"fov": 70, "size": [32, 18], "frames": [
+    {"origin": [0, 0, 1.5], "target": [0, -0.5, 0]}, {"origin": [0.2, 0.1, 1.4], "target": [0, -0.5, 0]}]}"#;
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let f = Self(tempfile::tempdir().unwrap());
+        std::fs::write(f.at("scene.xml"), SCENE).unwrap();
+        std::fs::write(f.at("path.json"), PATH).unwrap();
+        f
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn reprobe(&self, args: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args.split_whitespace()).current_dir(self.0.path()).output().unwrap()
+    }
+
+    /// Runs a command that must succeed; its `--json` figures.
+    fn figures(&self, args: &str) -> Value {
+        let output = self.reprobe(&format!("{args} --json"));
+        assert!(output.status.success(), "{args}: {}", text(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    /// Runs a command that must refuse its input: exit code 2, one clear message, no panic. Returns the message.
+    fn refusal(&self, args: &str) -> String {
+        let output = self.reprobe(args);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args}: {message}");
+        assert!(message.contains("error") && !message.contains("panicked") && !message.contains("RUST_BACKTRACE"), "{message}");
+        message
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+const RUN: &str = "run scene.xml --path path.json -o out --preset draft --probes 8 --probe-size 32x16 --spp 4 --size 32x18 \
+    --lightmap-spp 4 --texel 0.2 --reference-spp 8";
+
+/// Content of every file below a folder, by relative path, but for those that hold times.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = Vec::new();
+    let mut todo = vec![folder.to_path_buf()];
+    while let Some(dir) = todo.pop() {
+        for entry in std::fs::read_dir(dir).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                todo.push(path);
+            } else if path.file_name().is_some_and(|n| n != "timings.json") {
+                files.push((path.strip_prefix(folder).unwrap().to_path_buf(), std::fs::read(&path).unwrap()));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+#[test]
+fn run_makes_frames_and_a_report_and_threads_do_not_change_a_bit() {
+    let f = Folder::new();
+    f.figures(&format!("{RUN} --threads 1"));
+    let image = ExrImage::read(&f.at("out/frames/0001.exr")).unwrap();
+    assert_eq!((image.width, image.height), (32, 18));
+    for layer in ["glossy", "diffuse", "emission"] {
+        let pixels = image.rgb(Path::new(""), layer).unwrap();
+        assert!(pixels.iter().any(|p| p.max_element() > 0.0) || layer == "emission", "the {layer} layer is black");
+        assert!(pixels.iter().all(|p| p.is_finite()));
+    }
+    for name in ["report/index.html", "report/metrics.json", "report-glossy/metrics.json"] {
+        assert!(f.at("out").join(name).exists(), "{name}");
+    }
+    let first = contents(&f.at("out"));
+    std::fs::remove_dir_all(f.at("out")).unwrap();
+    f.figures(&format!("{RUN} --threads 3"));
+    let second = contents(&f.at("out"));
+    let names = |c: &[(PathBuf, Vec<u8>)]| c.iter().map(|(p, _)| p.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&first), names(&second));
+    for (a, b) in first.iter().zip(&second) {
+        assert!(a.1 == b.1, "{} differs", a.0.display());
+    }
+}
+
+#[test]
+fn run_again_does_only_what_is_missing() {
+    let f = Folder::new();
+    f.figures(RUN);
+    let before = contents(&f.at("out"));
+    let bake = |figures: &Value| figures["stages"][4]["figures"].clone();
+    assert_eq!(bake(&f.figures(RUN))["baked"], 0);
+    // A bake that was killed has some probes, and no set.json.
+    std::fs::remove_file(f.at("out/probes/set.json")).unwrap();
+    std::fs::remove_file(f.at("out/probes/0000.exr")).unwrap();
+    std::fs::write(f.at("out/probes/.reprobe-x.tmp"), "half a file").unwrap();
+    let message = f.refusal(&render(""));
+    assert!(message.contains("set.json") && message.contains("bake-probes"), "{message}");
+    assert_eq!(bake(&f.figures(RUN))["baked"], 1);
+    std::fs::remove_file(f.at("out/probes/.reprobe-x.tmp")).unwrap();
+    assert!(contents(&f.at("out")) == before, "the resumed bake differs from the whole one");
+}
+
+fn render(more: &str) -> String {
+    format!(
+        "render-path scene.xml --path path.json --size 32x18 --probes out/probes --curvature out/curvature.exr \
+         --lightmap out/lightmap.exr -o again {more}"
+    )
+}
+
+#[test]
+fn inputs_from_another_scene_or_another_run_are_refused() {
+    let f = Folder::new();
+    f.figures(RUN);
+    let message = f.refusal(&render("--supersample 2"));
+    assert!(message.contains("other views") && message.contains("--for-path"), "{message}");
+    let message = f.refusal(&render("--set gather.falof=3"));
+    assert!(message.contains("gather.falloff=8"), "{message}");
+
+    // Another camera is no other scene, another colour is.
+    std::fs::write(f.at("scene.xml"), SCENE.replace("0, 0, 1.5\"", "0, 0.1, 1.5\"")).unwrap();
+    f.figures(&render(""));
+    std::fs::write(f.at("scene.xml"), SCENE.replace("0.6, 0.5, 0.4", "0.6, 0.5, 0.3")).unwrap();
+    let message = f.refusal(&render(""));
+    assert!(message.contains("another scene") && message.contains("set.json"), "{message}");
+    let message = f.refusal("resmap scene.xml --probes out/probes.json -o out/resmap");
+    assert!(message.contains("another scene") && message.contains("probes.json"), "{message}");
+    std::fs::write(f.at("scene.xml"), SCENE).unwrap();
+
+    // Probes placed anew: the old maps do not fit.
+    f.figures("place-probes scene.xml --grid 2x2x1 -o out/probes.json");
+    let message = f.refusal("bake-probes scene.xml --probes out/probes.json --qhmap out/qhmap -o out/new");
+    assert!(message.contains("qhmap"), "{message}");
+}
+
+#[test]
+fn broken_files_are_refused_by_name() {
+    let f = Folder::new();
+    f.figures(RUN);
+    let bytes = std::fs::read(f.at("out/probes/0002.exr")).unwrap();
+    for (file, command) in [
+        ("out/probes/0002.exr", render("")),
+        ("out/probes/0002_forward.exr", render("")),
+        ("out/probes/set.json", render("")),
+        ("out/curvature.exr", render("")),
+        ("out/lightmap.exr", render("")),
+        ("out/probes.json", "resmap scene.xml --probes out/probes.json -o new".into()),
+        ("out/resmap/set.json", "qhmap out/resmap -o new".into()),
+        ("path.json", render("")),
+        ("scene.xml", render("")),
+    ] {
+        let whole = std::fs::read(f.at(file)).unwrap();
+        for broken in [&whole[..whole.len() / 2], &b"nonsense"[..], &b""[..]] {
+            std::fs::write(f.at(file), broken).unwrap();
+            let message = f.refusal(&command);
+            let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+            assert!(message.contains(name), "{file}: {message}");
+        }
+        std::fs::write(f.at(file), whole).unwrap();
+        let _ = std::fs::remove_dir_all(f.at("again"));
+        let _ = std::fs::remove_dir_all(f.at("new"));
+    }
+    assert_eq!(bytes, std::fs::read(f.at("out/probes/0002.exr")).unwrap());
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_an_error() {
+    let f = Folder::new();
+    std::fs::write(f.at("file"), "in the way").unwrap();
+    let message = f.refusal("curvature scene.xml -o file/curvature.exr");
+    assert!(message.contains("file"), "{message}");
+    // A limit on file size cuts a write short, as a full disk does.
+    if cfg!(target_os = "linux") {
+        let script = format!("trap '' XFSZ; ulimit -f 1; exec {} curvature scene.xml -o curvature.exr", env!("CARGO_BIN_EXE_reprobe"));
+        let output = Command::new("bash").args(["-c", &script]).current_dir(f.0.path()).output().unwrap();
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains("curvature.exr") && !message.contains("panicked"), "{message}");
+        assert!(!f.at("curvature.exr").exists());
+        assert!(std::fs::read_dir(f.0.path()).unwrap().all(|e| !e.unwrap().file_name().to_string_lossy().ends_with(".tmp")));
+    }
+}
+
+#[test]
+fn a_dry_run_prints_the_commands_and_writes_nothing() {
+    let f = Folder::new();
+    let output = f.reprobe(&format!("{RUN} --dry-run"));
+    let lines: Vec<String> = text(&output.stdout).lines().map(str::to_owned).collect();
+    let commands = ["place-probes", "resmap", "qhmap", "curvature", "bake-probes", "bake-lightmap", "render-path", "render-path"];
+    for (line, command) in lines.iter().zip(commands) {
+        assert!(line.starts_with(&format!("reprobe {command} ")), "{line}");
+    }
+    assert!(lines.len() >= 9 && !f.at("out").exists());
+}
