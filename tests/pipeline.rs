@@ -194,7 +194,8 @@ fn an_output_that_cannot_be_written_is_an_error() {
     assert!(message.contains("file"), "{message}");
     // A limit on file size cuts a write short, as a full disk does.
     if cfg!(target_os = "linux") {
-        let script = format!("trap '' XFSZ; ulimit -f 1; exec {} curvature scene.xml -o curvature.exr", env!("CARGO_BIN_EXE_reprobe"));
+        let script =
+            format!("trap '' XFSZ; ulimit -f 1; exec {} curvature scene.xml -o curvature.exr", env!("CARGO_BIN_EXE_reprobe"));
         let output = Command::new("bash").args(["-c", &script]).current_dir(f.0.path()).output().unwrap();
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{message}");
