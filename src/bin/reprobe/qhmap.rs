@@ -75,13 +75,14 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     )?;
     let Tally { mut correlation, raised } = tally.into_inner().unwrap_or_else(|e| e.into_inner());
     correlation.sort_by_key(|c| c.0);
-    let mean = correlation.iter().map(|c| c.1).sum::<f64>() / correlation.len().max(1) as f64;
-    let least = correlation.iter().map(|c| c.1).fold(1.0, f64::min);
+    // None where all maps were kept from before.
+    let least = correlation.iter().map(|c| c.1).reduce(f64::min);
+    let mean = least.map(|_| correlation.iter().map(|c| c.1).sum::<f64>() / correlation.len() as f64);
     let seconds = start.elapsed().as_secs_f64();
     let [w, h] = params.size;
-    let follows = match correlation.len() {
-        0 => String::new(),
-        _ => format!(", log-density follows log m by {mean:.2} (at least {least:.2})"),
+    let follows = match (mean, least) {
+        (Some(mean), Some(least)) => format!(", log-density follows log m by {mean:.2} (at least {least:.2})"),
+        _ => String::new(),
     };
     let warning = if raised > 0 { format!(", {raised} with a larger epsilon, lest quads flip") } else { String::new() };
     Ok(Outcome {

@@ -79,9 +79,11 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         },
     )?;
     let seconds = start.elapsed().as_secs_f64();
-    let share = glossy.into_inner() as f64 / texels.into_inner().max(1) as f64;
+    // None where all maps were kept from before.
+    let (texels, glossy) = (texels.into_inner(), glossy.into_inner());
+    let share = (texels > 0).then(|| glossy as f64 / texels as f64);
     let [w, h] = params.size;
-    let seen = if kept < set.count { format!(", {:.0} % of their texels glossy", share * 100.0) } else { String::new() };
+    let seen = share.map_or_else(String::new, |s| format!(", {:.0} % of their texels glossy", s * 100.0));
     Ok(Outcome {
         summary: format!(
             "{}: {} maps of {w} x {h}, {kept} kept from before{seen}, {seconds:.1} s",
