@@ -22,23 +22,34 @@ pub struct PlasticParams {
     pub specular_reflectance: Texture,
 }
 
+/// A plastic's colours at a point.
+#[derive(Clone, Copy)]
+pub(super) struct Colours {
+    pub diffuse: Rgb,
+    pub specular: Rgb,
+}
+
 impl PlasticParams {
-    /// Radiance of the base, per irradiance that reaches it through the coating and over the two transmissions:
-    /// albedo · Σ (internal reflections) / eta².
-    pub(super) fn base(&self, s: &Surface, eta: f32, internal_reflectance: f32) -> Rgb {
-        let albedo = self.diffuse_reflectance.eval(s.uv);
-        let lost = if self.nonlinear { albedo * internal_reflectance } else { Rgb::splat(internal_reflectance) };
-        albedo / ((Rgb::ONE - lost) * (eta * eta))
+    pub(super) fn at(&self, s: &Surface) -> Colours {
+        Colours { diffuse: self.diffuse_reflectance.eval(s.uv), specular: self.specular_reflectance.eval(s.uv) }
     }
 
+    /// Radiance of a base of albedo `diffuse`, per irradiance that reaches it through the coating and over the two
+    /// transmissions: albedo · Σ (internal reflections) / eta².
+    pub(super) fn base(&self, diffuse: Rgb, eta: f32, internal_reflectance: f32) -> Rgb {
+        let lost = if self.nonlinear { diffuse * internal_reflectance } else { Rgb::splat(internal_reflectance) };
+        diffuse / ((Rgb::ONE - lost) * (eta * eta))
+    }
+}
+
+impl Colours {
     /// Probability of drawing the specular lobe, of which the coating reflects the share `reflected` at `wi`.
     /// Mitsuba's rule, with the colours at the point in place of their means over the textures.
-    pub(super) fn specular_probability(&self, s: &Surface, reflected: f32, query: Query) -> f32 {
+    pub(super) fn specular_probability(&self, reflected: f32, query: Query) -> f32 {
         if query.lobes != Lobes::ALL {
             return if query.lobes.contains(Lobes::NON_DIFFUSE) { 1.0 } else { 0.0 };
         }
-        let specular = self.specular_reflectance.eval(s.uv).element_sum() * reflected;
-        let diffuse = self.diffuse_reflectance.eval(s.uv).element_sum() * (1.0 - reflected);
+        let (specular, diffuse) = (self.specular.element_sum() * reflected, self.diffuse.element_sum() * (1.0 - reflected));
         if specular > 0.0 { specular / (specular + diffuse) } else { 0.0 }
     }
 }
@@ -62,6 +73,14 @@ impl Plastic {
     fn reflected(&self, w: Vec3) -> f32 {
         fresnel::dielectric(w.z, self.eta).r
     }
+
+    /// Value and density of the diffuse lobe, for directions above the surface; `f_i` = reflected(wi).
+    fn diffuse(&self, colours: &Colours, f_i: f32, wo: Vec3, query: Query) -> (Rgb, f32) {
+        let pdf = cosine_hemisphere_pdf(wo);
+        let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
+        let value = base * ((1.0 - f_i) * (1.0 - self.reflected(wo)) * pdf);
+        (value, pdf * (1.0 - colours.specular_probability(f_i, query)))
+    }
 }
 
 impl Scatter for Plastic {
@@ -69,24 +88,20 @@ impl Scatter for Plastic {
         if wi.z <= 0.0 || wo.z <= 0.0 || !query.lobes.contains(Lobes::DIFFUSE) {
             return (Rgb::ZERO, 0.0);
         }
-        let f_i = self.reflected(wi);
-        let pdf = cosine_hemisphere_pdf(wo);
-        let value = self.params.base(s, self.eta, self.internal_reflectance) * ((1.0 - f_i) * (1.0 - self.reflected(wo)) * pdf);
-        (value, pdf * (1.0 - self.params.specular_probability(s, f_i, query)))
+        self.diffuse(&self.params.at(s), self.reflected(wi), wo, query)
     }
 
     fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
         if wi.z <= 0.0 {
             return None;
         }
-        let f_i = self.reflected(wi);
-        let p = self.params.specular_probability(s, f_i, query);
+        let (f_i, colours) = (self.reflected(wi), self.params.at(s));
+        let p = colours.specular_probability(f_i, query);
         if u < p {
-            let weight = self.params.specular_reflectance.eval(s.uv) * (f_i / p);
-            return Some(BsdfSample::mirrored(wi, weight, p));
+            return Some(BsdfSample::mirrored(wi, colours.specular * (f_i / p), p));
         }
         let wo = cosine_hemisphere(v);
-        let (value, pdf) = self.eval_pdf(s, wi, wo, query);
+        let (value, pdf) = self.diffuse(&colours, f_i, wo, query);
         BsdfSample::reflected(wo, value / pdf, pdf)
     }
 
@@ -98,7 +113,8 @@ impl Scatter for Plastic {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        self.params.base(s, self.eta, self.internal_reflectance) * (1.0 - self.reflected(wi))
+        let albedo = self.params.diffuse_reflectance.eval(s.uv);
+        self.params.base(albedo, self.eta, self.internal_reflectance) * (1.0 - self.reflected(wi))
     }
 
     fn diffuse_in(&self, _s: &Surface, wo: Vec3) -> f32 {

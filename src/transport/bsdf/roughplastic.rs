@@ -6,7 +6,7 @@
 
 use super::albedo::{gauss_legendre, lobe_albedo, reflected_mean, transmitted_mean};
 use super::microfacet::{ALPHA_MIN, Distribution, Microfacets};
-use super::plastic::PlasticParams;
+use super::plastic::{Colours, PlasticParams};
 use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio};
 use crate::math::{Rgb, reflect};
@@ -17,7 +17,7 @@ use glam::{Vec2, Vec3};
 const COSINES: usize = 64;
 /// Nodes of the quadrature behind an entry, each way; internal reflection has a kink at the critical angle.
 const EXTERNAL_NODES: usize = 32;
-const INTERNAL_NODES: usize = 48;
+const INTERNAL_NODES: usize = 24;
 
 /// The model, with its tables of transmittance.
 #[derive(Debug, Clone)]
@@ -65,15 +65,13 @@ impl RoughPlastic {
     fn facets(&self, query: Query) -> Microfacets {
         Microfacets::new(self.distribution, Vec2::splat(self.alpha * query.roughness_scale))
     }
-}
 
-impl Scatter for RoughPlastic {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
+    /// Value and density for a view above the surface; `t_i` = transmitted(wi).
+    fn eval_pdf_with(&self, colours: &Colours, t_i: f32, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
+        if wo.z <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let t_i = self.transmitted(wi);
-        let p = self.params.specular_probability(s, 1.0 - t_i, query);
+        let p = colours.specular_probability(1.0 - t_i, query);
         let (mut value, mut density) = (Rgb::ZERO, 0.0);
         if query.lobes.contains(Lobes::NON_DIFFUSE) {
             let facets = self.facets(query);
@@ -81,25 +79,36 @@ impl Scatter for RoughPlastic {
             let visible = 0.25 * facets.d(m) * facets.g1_over_cos(wi, m);
             if visible > 0.0 {
                 let f = fresnel::dielectric(wi.dot(m), self.eta).r;
-                value += self.params.specular_reflectance.eval(s.uv) * (f * visible * facets.g1(wo, m));
+                value += colours.specular * (f * visible * facets.g1(wo, m));
                 density += p * visible;
             }
         }
         if query.lobes.contains(Lobes::DIFFUSE) {
             let cosine = cosine_hemisphere_pdf(wo);
-            value += self.params.base(s, self.eta, self.internal_reflectance) * (t_i * self.transmitted(wo) * cosine);
+            let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
+            value += base * (t_i * self.transmitted(wo) * cosine);
             density += (1.0 - p) * cosine;
         }
         (value, density)
+    }
+}
+
+impl Scatter for RoughPlastic {
+    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return (Rgb::ZERO, 0.0);
+        }
+        self.eval_pdf_with(&self.params.at(s), self.transmitted(wi), wi, wo, query)
     }
 
     fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
         if wi.z <= 0.0 {
             return None;
         }
-        let p = self.params.specular_probability(s, 1.0 - self.transmitted(wi), query);
+        let (t_i, colours) = (self.transmitted(wi), self.params.at(s));
+        let p = colours.specular_probability(1.0 - t_i, query);
         let wo = if u < p { reflect(wi, self.facets(query).sample(wi, v)).normalize_or_zero() } else { cosine_hemisphere(v) };
-        let (value, pdf) = self.eval_pdf(s, wi, wo, query);
+        let (value, pdf) = self.eval_pdf_with(&colours, t_i, wi, wo, query);
         BsdfSample::reflected(wo, value / pdf, pdf)
     }
 
@@ -111,7 +120,8 @@ impl Scatter for RoughPlastic {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        self.params.base(s, self.eta, self.internal_reflectance) * self.transmitted(wi)
+        let albedo = self.params.diffuse_reflectance.eval(s.uv);
+        self.params.base(albedo, self.eta, self.internal_reflectance) * self.transmitted(wi)
     }
 
     fn diffuse_in(&self, _s: &Surface, wo: Vec3) -> f32 {
