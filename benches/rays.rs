@@ -11,7 +11,7 @@ use reprobe::transport::bvh::Bvh;
 use reprobe::transport::{Ray, Surface};
 use std::time::Instant;
 
-const PATHS: u32 = 400_000;
+const PATHS: u32 = 50_000;
 const BOUNCES: u32 = 5;
 
 fn uniform(words: &[u32]) -> f32 {
@@ -74,6 +74,40 @@ fn rays(scene: &Scene, bvh: &Bvh) -> Vec<Ray> {
     rays
 }
 
+/// obvhs's binary tree with its own triangle test, to compare with.
+struct Obvhs {
+    tree: obvhs::bvh2::Bvh2,
+    triangles: Vec<obvhs::triangle::Triangle>,
+}
+
+impl Obvhs {
+    fn new(scene: &Scene) -> Self {
+        let of = |t: u32| {
+            let [v0, v1, v2] = scene.geometry.corners(t).map(|p| p.to_vec3a());
+            obvhs::triangle::Triangle { v0, v1, v2 }
+        };
+        let triangles: Vec<_> = (0..scene.geometry.triangles.len() as u32).map(of).collect();
+        let params = obvhs::BvhBuildParams { pre_split: false, ..obvhs::BvhBuildParams::medium_build() };
+        let tree = obvhs::bvh2::builder::build_bvh2_from_tris(&triangles, params, &mut std::time::Duration::default());
+        let triangles = tree.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
+        Self { tree, triangles }
+    }
+
+    fn ray(ray: &Ray) -> obvhs::ray::Ray {
+        obvhs::ray::Ray::new(ray.o.to_vec3a(), ray.d.to_vec3a(), ray.t_min, ray.t_max)
+    }
+
+    fn closest(&self, ray: &Ray) -> bool {
+        let mut hit = obvhs::ray::RayHit::none();
+        self.tree.ray_traverse(Self::ray(ray), &mut hit, |r, i| self.triangles[i].intersect(r));
+        hit.t < f32::INFINITY
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        !self.tree.ray_traverse_miss(Self::ray(ray), |r, i| self.triangles[i].intersect(r))
+    }
+}
+
 fn main() {
     let folders: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     if folders.is_empty() {
@@ -88,7 +122,7 @@ fn main() {
         let shadow: Vec<Ray> =
             rays.iter().enumerate().map(|(i, r)| Ray { t_max: 0.2 + 3.0 * uniform(&[i as u32, 3]), ..*r }).collect();
         let rate = |f: &dyn Fn() -> usize| {
-            let best = (0..5).map(|_| {
+            let best = (0..3).map(|_| {
                 let start = cpu_seconds();
                 std::hint::black_box(f());
                 cpu_seconds() - start
@@ -97,8 +131,11 @@ fn main() {
         };
         let closest = rate(&|| rays.iter().filter(|r| bvh.closest(&scene, r).is_some()).count());
         let any = rate(&|| shadow.iter().filter(|r| bvh.occluded(&scene, r)).count());
+        let obvhs = Obvhs::new(&scene);
+        let obvhs_closest = rate(&|| rays.iter().filter(|r| obvhs.closest(r)).count());
+        let obvhs_any = rate(&|| shadow.iter().filter(|r| obvhs.occluded(r)).count());
         println!(
-            "{folder}: {} triangles built in {build:.2} s; closest {closest:.2}, any {any:.2} million rays a second and thread",
+            "{folder}: {} triangles built in {build:.2} s; closest {closest:.2}, any {any:.2} million rays a second and thread (obvhs {obvhs_closest:.2}, {obvhs_any:.2})",
             scene.geometry.triangles.len()
         );
     }

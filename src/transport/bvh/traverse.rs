@@ -14,6 +14,9 @@ const LEAST_DIRECTION: f32 = 1e-24;
 /// Entries of the stack that lives on the machine's: enough for nodes 35 deep.
 pub const STACK: usize = 256;
 
+// No closures over lanes in here: a closure does not inherit the caller's target features, and each operation in it would
+// be a function call.
+
 /// A ray made ready for boxes and triangles.
 struct Prepared<S: Simd> {
     origin: [S::F; 3],
@@ -35,54 +38,62 @@ impl<S: Simd> Prepared<S> {
         let inverse = d.map(|x| 1.0 / if x.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(x) } else { x });
         let shear = Shear::new(ray);
         Self {
-            origin: [ray.o.x, ray.o.y, ray.o.z].map(|x| s.splat(x)),
-            inverse: inverse.map(|x| s.splat(x)),
+            origin: splat3(s, ray.o.into()),
+            inverse: splat3(s, inverse),
             near: [0, 1, 2].map(|k| if negative[k] { k + 3 } else { k }),
             order: s.octant_order(u32::from(negative[0]) | u32::from(negative[1]) << 1 | u32::from(negative[2]) << 2),
             t_min: s.splat(ray.t_min),
-            shear_origin: shear.origin.map(|x| s.splat(x)),
-            shear: shear.shear.map(|x| s.splat(x)),
+            shear_origin: splat3(s, shear.origin),
+            shear: splat3(s, shear.shear),
             axes: shear.axes,
         }
+    }
+
+    /// Distance to the plane of each child's box across axis `k`.
+    #[inline(always)]
+    fn slab(&self, s: S, node: &Node, bound: usize, k: usize) -> S::F {
+        s.mul(s.sub(s.load(&node.bounds[bound]), self.origin[k]), self.inverse[k])
     }
 
     /// Where the ray enters and leaves each child's box. Rounding aside: boxes are wider than what they hold.
     #[inline(always)]
     fn slabs(&self, s: S, node: &Node, t_max: S::F) -> (S::F, S::F) {
-        let side = |k: usize, bounds: &[f32; 8]| s.mul(s.sub(s.load(bounds), self.origin[k]), self.inverse[k]);
-        let near = |k: usize| side(k, &node.bounds[self.near[k]]);
-        let far = |k: usize| side(k, &node.bounds[k + 3 - (self.near[k] - k)]);
-        let enter = s.max(s.max(near(0), near(1)), s.max(near(2), self.t_min));
-        let leave = s.mul(s.min(s.min(far(0), far(1)), far(2)), s.splat(FAR_SLACK));
-        (enter, s.min(leave, t_max))
+        let [x, y, z] = self.near;
+        let enter = s.max(s.max(self.slab(s, node, x, 0), self.slab(s, node, y, 1)), s.max(self.slab(s, node, z, 2), self.t_min));
+        // Lower and upper bounds lie three apart: the far side is the one that is not near.
+        let leave = s.min(s.min(self.slab(s, node, 3 - x, 0), self.slab(s, node, 5 - y, 1)), self.slab(s, node, 7 - z, 2));
+        (enter, s.min(s.mul(leave, s.splat(FAR_SLACK)), t_max))
+    }
+
+    /// The corners `k` of eight triangles, sheared.
+    #[inline(always)]
+    fn corner(&self, s: S, block: &Block, k: usize) -> [S::F; 3] {
+        let [kx, ky, kz] = self.axes;
+        let z = s.sub(s.load(&block.corners[k][kz]), self.shear_origin[2]);
+        let x = s.sub(s.load(&block.corners[k][kx]), self.shear_origin[0]);
+        let y = s.sub(s.load(&block.corners[k][ky]), self.shear_origin[1]);
+        [s.sub(x, s.mul(self.shear[0], z)), s.sub(y, s.mul(self.shear[1], z)), z]
     }
 
     /// [`Shear::intersect`] of eight triangles: a bit for each that is hit within [t_min, t_max]; t, u and v.
     #[inline(always)]
-    fn block(&self, s: S, block: &Block, t_max: S::F) -> (u32, [S::F; 3]) {
-        let [kx, ky, kz] = self.axes;
-        let [ox, oy, oz] = self.shear_origin;
-        let [sx, sy, sz] = self.shear;
-        let corner = |k: usize| {
-            let z = s.sub(s.load(&block.corners[k][kz]), oz);
-            let x = s.sub(s.sub(s.load(&block.corners[k][kx]), ox), s.mul(sx, z));
-            let y = s.sub(s.sub(s.load(&block.corners[k][ky]), oy), s.mul(sy, z));
-            [x, y, z]
-        };
-        let (a, b, c) = (corner(0), corner(1), corner(2));
+    fn block(&self, s: S, block: &Block, t_max: S::F) -> (u32, S::F, S::F, S::F) {
+        let a = self.corner(s, block, 0);
+        let b = self.corner(s, block, 1);
+        let c = self.corner(s, block, 2);
         let u = s.sub(s.mul(c[0], b[1]), s.mul(c[1], b[0]));
         let v = s.sub(s.mul(a[0], c[1]), s.mul(a[1], c[0]));
         let w = s.sub(s.mul(b[0], a[1]), s.mul(b[1], a[0]));
         let zero = s.splat(0.0);
         let inside = s.le(zero, s.min(u, s.min(v, w))) | s.le(s.max(u, s.max(v, w)), zero);
         if inside == 0 {
-            return (0, [zero; 3]);
+            return (0, zero, zero, zero);
         }
         // Where all three are zero, t is NaN and lies in no range.
         let inv = s.div(s.splat(1.0), s.add(s.add(u, v), w));
         let (u, v, w) = (s.mul(u, inv), s.mul(v, inv), s.mul(w, inv));
-        let t = s.mul(s.add(s.add(s.mul(u, a[2]), s.mul(v, b[2])), s.mul(w, c[2])), sz);
-        (inside & s.le(self.t_min, t) & s.le(t, t_max), [t, v, w])
+        let t = s.mul(s.add(s.add(s.mul(u, a[2]), s.mul(v, b[2])), s.mul(w, c[2])), self.shear[2]);
+        (inside & s.le(self.t_min, t) & s.le(t, t_max), t, v, w)
     }
 }
 
@@ -121,11 +132,11 @@ pub fn closest<S: Simd>(
             top += mask.count_ones() as usize;
         } else {
             let block = &tree.blocks[(id & !MARK) as usize];
-            let (mut mask, found) = r.block(s, block, s.splat(nearest));
+            let (mut mask, t, u, v) = r.block(s, block, s.splat(nearest));
             if mask == 0 {
                 continue;
             }
-            let [t, u, v] = found.map(|x| lanes(s, x));
+            let (t, u, v) = (lanes(s, t), lanes(s, u), lanes(s, v));
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & 7;
                 mask &= mask - 1;
@@ -161,11 +172,11 @@ pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut 
             top += mask.count_ones() as usize;
         } else {
             let block = &tree.blocks[(id & !MARK) as usize];
-            let (mut mask, found) = r.block(s, block, t_max);
+            let (mut mask, t, u, v) = r.block(s, block, t_max);
             if mask == 0 {
                 continue;
             }
-            let [t, u, v] = found.map(|x| lanes(s, x));
+            let (t, u, v) = (lanes(s, t), lanes(s, u), lanes(s, v));
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & 7;
                 mask &= mask - 1;
@@ -177,6 +188,11 @@ pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut 
         }
     }
     false
+}
+
+#[inline(always)]
+fn splat3<S: Simd>(s: S, x: [f32; 3]) -> [S::F; 3] {
+    [s.splat(x[0]), s.splat(x[1]), s.splat(x[2])]
 }
 
 #[inline(always)]
