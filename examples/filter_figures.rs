@@ -4,7 +4,7 @@
 //! `cargo run --release --example filter_figures -- docs/pictures`
 
 use glam::{Vec2, Vec3};
-use image::{Rgb as Pixel, RgbImage};
+use image::{GrayImage, Luma, Rgb as Pixel, RgbImage};
 use reprobe::math::hash_words;
 use reprobe::render::filter::{FilterInput, FilterParams, Kernel, Method, filter};
 use reprobe::render::footprint::{Footprint, FootprintParams, ggx};
@@ -119,7 +119,7 @@ fn variants(folder: &Path) -> Result<(), image::ImageError> {
     let run = |method| input.filter(&FilterParams { method, kernel: Kernel::Gaussian, ..FilterParams::default() });
     let full = run(Method::Full);
     let panels = [input.color.clone(), full.clone(), run(Method::TwoPass), run(Method::FourPass)];
-    let mut picture = RgbImage::new(4 * SIZE as u32, 2 * SIZE as u32);
+    let mut picture = GrayImage::new(4 * SIZE as u32, 2 * SIZE as u32);
     for (k, panel) in panels.iter().enumerate() {
         let square: f32 = panel.iter().zip(&full).map(|(a, b)| (a.x - b.x).powi(2)).sum();
         println!(
@@ -130,7 +130,7 @@ fn variants(folder: &Path) -> Result<(), image::ImageError> {
         for i in 0..SIZE * SIZE {
             let (x, y) = ((k * SIZE + i % SIZE) as u32, (i / SIZE) as u32);
             let contrast = if k == 0 { 1.0 } else { 4.0 };
-            let grey = |v: f32| Pixel([(v.clamp(0.0, 1.0) * 255.0) as u8; 3]);
+            let grey = |v: f32| Luma([(v.clamp(0.0, 1.0) * 255.0) as u8]);
             picture.put_pixel(x, y, grey(0.5 + contrast * (panel[i].x - 0.5)));
             picture.put_pixel(x, y + SIZE as u32, grey(0.5 + 8.0 * (panel[i].x - full[i].x)));
         }

@@ -171,6 +171,26 @@ fn face_normals_make_planes_of_a_sphere() {
 }
 
 #[test]
+fn facets_with_normals_of_their_own_are_planes() {
+    // A prism of 24 sides whose file gives each side its own normals, 15 degrees apart.
+    let smooth = cylinder(0.25, 24, 4);
+    let mut g = Geometry { objects: smooth.objects.clone(), ..Geometry::default() };
+    for pair in smooth.triangles.chunks(2) {
+        let n = smooth.area_normal(g.triangles.len() as u32).normalize();
+        for t in pair {
+            let first = g.positions.len() as u32;
+            g.positions.extend(t.map(|i| smooth.positions[i as usize]));
+            g.normals.extend([n; 3]);
+            g.triangles.push([first, first + 1, first + 2]);
+        }
+    }
+    g.objects[0].vertices = 0..g.positions.len() as u32;
+    g.triangle_object = vec![0; g.triangles.len()];
+    let map = estimate(&g);
+    assert!(map.k1.iter().chain(&map.k2).all(|&k| k == 0.0));
+}
+
+#[test]
 fn interpolation_keeps_the_tensor_and_turns_its_sign_with_the_viewer() {
     let g = torus(1.0, 0.3);
     let map = estimate(&g);

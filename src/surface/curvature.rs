@@ -22,7 +22,9 @@ use rayon::prelude::*;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CurvatureParams {
-    /// Vertices at one place are one vertex if their normals differ by less than this, degrees. Ours: the angle of the averaging.
+    /// Vertices at one place are one vertex if their normals differ by less than this, degrees. Ours: enough for the rounding of files,
+    /// less than the creases and facets that a file splits on purpose: mirror rays see no bend there (2 to 4 % of the vertices of
+    /// living rooms and bathrooms are split by 10 to 40 degrees).
     pub weld_degrees: f32,
     /// Neighbours are averaged if their normals differ by less than this, degrees. Paper: 40 (§4.3).
     pub regularize_degrees: f32,
@@ -32,7 +34,7 @@ pub struct CurvatureParams {
 
 impl Default for CurvatureParams {
     fn default() -> Self {
-        Self { weld_degrees: 40.0, regularize_degrees: 40.0, tessellation: TessellationParams::default() }
+        Self { weld_degrees: 5.0, regularize_degrees: 40.0, tessellation: TessellationParams::default() }
     }
 }
 

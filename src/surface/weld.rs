@@ -1,8 +1,8 @@
 //! One object as a mesh without seams, and who touches whom in it.
 //!
 //! Files split vertices where texture coordinates or normals jump; a discrete operator needs the surface whole.
-//! Ours: vertices at exactly the same position are one if their normals lie within the angle of the 40-degree rule (§4.3);
-//! a sharper edge stays split, and is then a boundary of the mesh.
+//! Ours: vertices at exactly the same position are one if their normals agree to within a few degrees; a crease stays split, and is
+//! then a boundary of the mesh.
 
 use crate::scene::{Geometry, Object};
 use glam::Vec3;
