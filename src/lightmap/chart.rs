@@ -146,8 +146,8 @@ fn lay_out(geometry: &Geometry, first: u32, locals: &[u32], normal: Vec3, origin
     let line = |axis: Vec2| {
         let (lo, hi) = extent(axis);
         let texels = ((hi - lo) / texel - 1e-3).ceil().max(1.0);
-        // A flat extent (a sliver) gets its one texel all the same.
-        let scale = if hi - lo > 1e-6 * texel { texels / (hi - lo) } else { 0.0 };
+        // A flat extent (a sliver) gets its one texel all the same; a stretch without bound would lose the place to rounding.
+        let scale = if hi - lo > 1e-3 * texel { texels / (hi - lo) } else { 0.0 };
         let world = (frame.s * axis.x + frame.t * axis.y) * scale;
         (world.extend(-world.dot(origin) - lo * scale), texels as u32)
     };

@@ -21,13 +21,14 @@ pub struct BakeParams {
     /// Multiplies alpha at the first vertex. *Paper* (§6.1): 0.5.
     pub roughness_scale: f32,
     /// Spread the samples over the texel's solid angle, as far as it shows the reflector that its centre shows, in place of
-    /// sending all through the centre. *Ours*: keeps what mirrors show from aliasing.
+    /// sending all through the centre. *Ours*. A spread texel mixes what a mirror shows on both sides of an edge, and the gather
+    /// then finds a bright colour where the geometry maps promise a dark surface; so it is off by default.
     pub spread: bool,
 }
 
 impl Default for BakeParams {
     fn default() -> Self {
-        Self { spp: 2048, roughness_scale: 0.5, spread: true }
+        Self { spp: 2048, roughness_scale: 0.5, spread: false }
     }
 }
 

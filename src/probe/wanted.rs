@@ -37,7 +37,7 @@ pub struct Views {
     pub cameras: String,
     /// Rays a pixel, along one side.
     pub supersample: u32,
-    /// How the texels are chosen.
+    /// How the texels are chosen; what is then made of their colours is set to the default.
     pub gather: GatherParams,
 }
 
@@ -51,7 +51,9 @@ impl Views {
             hash.update(&c.fov_x.to_le_bytes());
             hash.update(bytemuck::cast_slice(&c.size));
         }
-        Self { cameras: hash.finalize().to_hex().to_string(), supersample, gather: gather.clone() }
+        let GatherParams { falloff, bilinear, albedo_ratio, .. } = GatherParams::default();
+        let gather = GatherParams { falloff, bilinear, albedo_ratio, ..gather.clone() };
+        Self { cameras: hash.finalize().to_hex().to_string(), supersample, gather }
     }
 }
 

@@ -48,9 +48,13 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let loaded = began.elapsed().as_secs_f64();
     let atlas = AtlasParams { texel: args.texel, budget: args.texels };
     let params = BakeParams { spp: args.spp, atlas, ..Default::default() };
+    let provenance = Provenance::new("bake-lightmap", &world.scene.hash, common.seed, &params);
+    if ExrImage::read_provenance(&args.output).is_ok_and(|found| found.as_ref() == Some(&provenance)) {
+        let summary = format!("{}: up to date", args.output.display());
+        return Ok(Outcome { summary, figures: json!({ "up_to_date": true }), ..Outcome::default() });
+    }
     let plan = Plan::new(&world, &params, common.seed)?;
     let atlas = &plan.atlas;
-    let provenance = Provenance::new("bake-lightmap", &world.scene.hash, common.seed, &params);
     let store = Folder::new(&parts_folder(&args.output), &serde_json::to_string(&provenance)?);
 
     let planned = began.elapsed().as_secs_f64() - loaded;

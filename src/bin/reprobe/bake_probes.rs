@@ -10,7 +10,7 @@ use reprobe::probe::file::{BakedSet, MAX_MATERIALS};
 use reprobe::probe::placement::ProbeGrid;
 use reprobe::probe::qhmap::{ParameterMap, map_paths};
 use reprobe::probe::set::{ProbeSet, numbered};
-use reprobe::probe::store::write_set;
+use reprobe::probe::store::{ProbeStore, write_set};
 use reprobe::probe::wanted::{Views, Wanted, wanted_texels};
 use reprobe::progress::Progress;
 use reprobe::render::gather::GatherParams;
@@ -49,9 +49,9 @@ pub struct Args {
     /// Factor on roughness at the first glossy vertex
     #[arg(long, value_name = "S", default_value_t = BakeParams::default().roughness_scale)]
     roughness_scale: f32,
-    /// Send all of a texel's paths through its centre
+    /// Spread a texel's paths over its solid angle, in place of sending all through its centre
     #[arg(long)]
-    no_spread: bool,
+    spread: bool,
     /// Bake probes I, I+N, I+2N, ... only
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     shard: Option<Shard>,
@@ -95,33 +95,34 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     maps.provenance.check_scene(&args.qhmap, &scene.hash)?;
     maps.provenance.check_input(&args.qhmap, "probes", &hash_file(&args.probes)?)?;
 
-    let params = BakeParams { spp: args.spp, roughness_scale: args.roughness_scale, spread: !args.no_spread };
+    let params = BakeParams { spp: args.spp, roughness_scale: args.roughness_scale, spread: args.spread };
     let progress = common.progress();
-    let (views, wanted) = match &args.for_path {
+    let gather = if args.paper { GatherParams::paper() } else { GatherParams::default() };
+    let for_path = match &args.for_path {
         Some(path) => {
-            let cameras: Vec<_> =
-                views(common, scene, Some(path), args.size, args.frames.as_ref())?.into_iter().map(|v| v.camera).collect();
-            let gather = if args.paper { GatherParams::paper() } else { GatherParams::default() };
-            let views = Views::new(&cameras, args.supersample, &gather);
-            let file = args.curvature.as_ref().context("--for-path needs --curvature")?;
-            let curvature = curvature_file::read(file, scene.geometry.positions.len(), &scene.hash)?;
-            let wanted = wanted_texels(
-                &world,
-                &curvature,
-                &grid,
-                &|i| Ok(ParameterMap::load(&args.qhmap, i)?.0),
-                &cameras,
-                &views,
-                &progress,
-            )?;
-            (Some(views), Some(wanted))
+            let views = views(common, scene, Some(path), args.size, args.frames.as_ref())?;
+            let cameras: Vec<_> = views.into_iter().map(|v| v.camera).collect();
+            Some((Views::new(&cameras, args.supersample, &gather), cameras))
         }
-        None => (None, None),
+        None => None,
     };
-
+    let views = for_path.as_ref().map(|(views, _)| views.clone());
     let provenance = Provenance::new("bake-probes", &scene.hash, common.seed, &json!({ "bake": params, "views": views }))
         .with_input("probes", hash_file(&args.probes)?)
         .with_input("qhmap", hash_file(&ProbeSet::path(&args.qhmap))?);
+    if ProbeStore::open(&args.output, scene, 0).is_ok_and(|found| found.set.provenance == provenance) {
+        let summary = format!("{}: up to date", args.output.display());
+        return Ok(Outcome { summary, figures: json!({ "baked": 0, "up_to_date": true }), ..Outcome::default() });
+    }
+    let wanted = match &for_path {
+        Some((views, cameras)) => {
+            let file = args.curvature.as_ref().context("--for-path needs --curvature")?;
+            let curvature = curvature_file::read(file, scene.geometry.positions.len(), &scene.hash)?;
+            let map = |i| Ok(ParameterMap::load(&args.qhmap, i)?.0);
+            Some(wanted_texels(&world, &curvature, &grid, &map, cameras, views, &progress)?)
+        }
+        None => None,
+    };
     let needed: Vec<usize> = match &wanted {
         Some(w) => w.keys().copied().collect(),
         None => (0..grid.len()).collect(),
