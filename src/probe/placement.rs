@@ -194,15 +194,11 @@ fn check_counts(counts: [u32; 3]) -> std::result::Result<(), String> {
 
 /// The counts along x, y and z whose product comes nearest to `count` among those that a cubic spacing gives.
 fn even_counts(extent: Vec3, count: u32) -> [u32; 3] {
-    let extent = extent.max(Vec3::splat(extent.max_element() * 1e-3));
-    let at = |spacing: f32| (extent / spacing).round().max(Vec3::ONE).as_uvec3().to_array();
-    let product = |c: [u32; 3]| c.iter().map(|&n| u64::from(n)).product::<u64>();
-    // Around the spacing that would fit exactly, finely enough to meet each rounding.
-    let ideal = (extent.element_product() / count as f32).cbrt().max(f32::MIN_POSITIVE);
-    (0..200)
-        .map(|i| at(ideal * (0.5 + i as f32 * 0.005)))
-        .min_by_key(|&c| product(c).abs_diff(u64::from(count)))
-        .unwrap_or([1; 3])
+    let longest = extent.max_element().max(f32::MIN_POSITIVE);
+    let with_longest = |n: u32| (extent * (n as f32 / longest)).round().max(Vec3::ONE).as_uvec3().to_array();
+    let product = |c: &[u32; 3]| c.iter().map(|&n| u64::from(n)).product::<u64>();
+    let fits = (1..=count.min(PROBES_MAX as u32)).map(with_longest);
+    fits.min_by_key(|c| product(c).abs_diff(u64::from(count))).unwrap_or([1; 3])
 }
 
 #[cfg(test)]
