@@ -180,50 +180,45 @@ impl<'a> Plan<'a> {
     }
 
     fn finish(&self, mut side: Side, back: bool) -> Vec<Rgb> {
-        self.lighten_voids(&mut side, back);
-        let mut open = vec![false; self.atlas.charts.len()];
-        for (i, &pixel) in self.texels.pixel.iter().enumerate() {
-            open[self.texels.chart[i] as usize] |= side.flags[pixel as usize] & OPEN != 0;
-        }
-        let mut valid = vec![false; side.pixels.len()];
-        for (i, &pixel) in self.texels.pixel.iter().enumerate() {
-            // A chart with nothing in the open makes do with what it has.
-            let wanted = if open[self.texels.chart[i] as usize] { OPEN } else { CONTACT };
-            valid[pixel as usize] = side.flags[pixel as usize] & wanted != 0;
-        }
+        self.lighten_hidden(&mut side, back);
+        let valid: Vec<bool> = side.flags.iter().map(|f| f & (OPEN | CONTACT) != 0).collect();
         fill::dilate(&self.atlas, &mut side.pixels, &valid);
         let active = |chart: u32| self.active[chart as usize][back as usize];
         seam::close(&self.world.scene.geometry, &self.atlas, &mut side.pixels, &valid, &active);
         side.pixels
     }
 
-    /// Texels in the dark behind a wall take the light of their neighbours before it, so that interpolation up to the wall
-    /// does not reach into the dark.
-    fn lighten_voids(&self, side: &mut Side, back: bool) {
+    /// Texels in the dark behind a wall, and texels pressed against something, take the light of their neighbours in the
+    /// open, so that interpolation up to a wall or a foot does not reach into the dark. Those further in keep their own:
+    /// they may be seen through a crack.
+    fn lighten_hidden(&self, side: &mut Side, back: bool) {
         let width = self.atlas.size[0] as i64;
         let mut texel_at = vec![u32::MAX; side.pixels.len()];
         for (i, &pixel) in self.texels.pixel.iter().enumerate() {
             texel_at[pixel as usize] = i as u32;
         }
         let visibility = self.visibility();
+        let centre = |texel: usize| visibility.sample(texel, Vec2::splat(0.5));
         let changes: Vec<(usize, Rgb)> = (0..self.texels.len())
             .into_par_iter()
             .filter_map(|i| {
                 let pixel = self.texels.pixel[i] as usize;
-                if side.flags[pixel] & OPEN == 0 || side.pixels[pixel] != Rgb::ZERO {
+                let pressed = side.flags[pixel] & CONTACT != 0;
+                let void = side.flags[pixel] & OPEN != 0 && side.pixels[pixel] == Rgb::ZERO;
+                if !pressed && !void {
                     return None;
                 }
-                let lit: Vec<usize> = [-width - 1, -width, 1 - width, -1, 1, width - 1, width, width + 1]
-                    .into_iter()
-                    .map(|d| (pixel as i64 + d) as usize)
-                    .filter(|&p| side.flags.get(p).is_some_and(|f| f & OPEN != 0) && side.pixels[p] != Rgb::ZERO)
-                    .filter(|&p| texel_at[p] != u32::MAX && self.texels.chart[texel_at[p] as usize] == self.texels.chart[i])
-                    .collect();
-                let centre = |t: usize| visibility.sample(t, Vec2::splat(0.5));
-                let apart = |p: usize| {
-                    side.flags[p] & SPLIT != 0 || !visibility.together(&centre(i), &centre(texel_at[p] as usize), back)
+                let in_the_open = |&p: &usize| {
+                    let chart = |t: u32| self.texels.chart[t as usize];
+                    side.flags.get(p).is_some_and(|f| f & OPEN != 0)
+                        && chart(texel_at[p]) == self.texels.chart[i]
+                        && (pressed
+                            || side.pixels[p] != Rgb::ZERO
+                                && (side.flags[p] & SPLIT != 0
+                                    || !visibility.together(&centre(i), &centre(texel_at[p] as usize), back)))
                 };
-                let lit: Vec<usize> = lit.into_iter().filter(|&p| apart(p)).collect();
+                let around = [-width - 1, -width, 1 - width, -1, 1, width - 1, width, width + 1];
+                let lit: Vec<usize> = around.into_iter().map(|d| (pixel as i64 + d) as usize).filter(in_the_open).collect();
                 (!lit.is_empty()).then(|| (pixel, lit.iter().map(|&p| side.pixels[p]).sum::<Rgb>() / lit.len() as f32))
             })
             .collect();

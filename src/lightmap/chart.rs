@@ -18,6 +18,12 @@ const MAX_DEVIATION_COS: f32 = 0.64;
 /// In the end no triangle may be seen more obliquely than this (75 degrees).
 const MIN_FACING_COS: f32 = 0.26;
 
+/// A chart whose normals deviate by more than 20 degrees from the mean ...
+const CURVED_COS: f32 = 0.94;
+
+/// ... has at least this many texels along each side, however small it is: the sides of a rod are lit differently.
+const CURVED_TEXELS: u32 = 3;
+
 /// Facets with edges up to this many texels may share a chart across a crease.
 const SMALL_FACET_TEXELS: f32 = 1.0;
 
@@ -114,17 +120,31 @@ fn flatten(geometry: &Geometry, adjacency: &Adjacency, texel: f32, grown: &[u32]
         grown.iter().partition(|&&t| adjacency.normals[t as usize].dot(normal) >= MIN_FACING_COS);
     let first = adjacency.first;
     let origin = geometry.corners(first + fits[0])[0];
-    let chart = lay_out(geometry, first, &fits, normal, origin, texel);
+    let lay_out = |triangles: &[u32]| {
+        let curved = triangles.iter().any(|&t| adjacency.normals[t as usize].dot(normal) < CURVED_COS);
+        lay_out(geometry, first, triangles, &Plane { normal, origin, texel, least: if curved { CURVED_TEXELS } else { 1 } })
+    };
+    let chart = lay_out(&fits);
     let flat = without_folds(geometry, first, &chart, &fits);
     if flat.len() == fits.len() {
         return (chart, rejected);
     }
     rejected.extend(fits.iter().filter(|t| !flat.contains(t)));
-    (lay_out(geometry, first, &flat.into_iter().collect::<Vec<_>>(), normal, origin, texel), rejected)
+    (lay_out(&flat.into_iter().collect::<Vec<_>>()), rejected)
+}
+
+/// What a chart is projected on, and how finely.
+struct Plane {
+    normal: Vec3,
+    origin: Vec3,
+    texel: f32,
+    /// Fewest texels along a side.
+    least: u32,
 }
 
 /// The smallest rectangle about the projected triangles, stretched to whole texels.
-fn lay_out(geometry: &Geometry, first: u32, locals: &[u32], normal: Vec3, origin: Vec3, texel: f32) -> Chart {
+fn lay_out(geometry: &Geometry, first: u32, locals: &[u32], plane: &Plane) -> Chart {
+    let &Plane { normal, origin, texel, least } = plane;
     let frame = crate::math::Frame::from_normal(normal);
     let points: Vec<Vec2> = locals
         .iter()
@@ -145,7 +165,7 @@ fn lay_out(geometry: &Geometry, first: u32, locals: &[u32], normal: Vec3, origin
     }
     let line = |axis: Vec2| {
         let (lo, hi) = extent(axis);
-        let texels = ((hi - lo) / texel - 1e-3).ceil().max(1.0);
+        let texels = ((hi - lo) / texel - 1e-3).ceil().max(least as f32);
         // A flat extent (a sliver) gets its one texel all the same; a stretch without bound would lose the place to rounding.
         let scale = if hi - lo > 1e-3 * texel { texels / (hi - lo) } else { 0.0 };
         let world = (frame.s * axis.x + frame.t * axis.y) * scale;

@@ -4,15 +4,24 @@
 //! baked. That is a sparse least-squares problem: minimise Σ (a - b)² + λ Σ (x - x₀)² over points of the seams and the
 //! texels that they touch, gutters included. Conjugate gradients solve it in a few steps, since λ bounds the condition.
 
-use super::atlas::{Atlas, Seam};
+use super::atlas::{Atlas, GUTTER, Seam};
 use super::lookup::bilinear;
-use crate::math::Rgb;
+use crate::math::{Rgb, luminance};
 use crate::scene::Geometry;
 use glam::Vec2;
 use std::collections::BTreeMap;
 
 /// λ of a texel with samples of its own: small, so that seams close, large enough that noise stays where it is.
 const KEEP_BAKED: f32 = 0.05;
+
+/// Texels across a chart from which on λ is what it is; narrower charts hold on to their light by the cube of how much
+/// they are narrower. A seam moves the texels beside it, and on a rod two texels wide those are all: its lit side would
+/// bleed into its dark side.
+const WIDE_CHART: f32 = 8.0;
+
+/// Relative jump at which a seam's weight has fallen to a half. Noise stays well below in a finished bake; a larger jump
+/// is light that really changes within a texel or two, which shall not spread.
+const HALF_JUMP: f32 = 0.3;
 
 /// λ of gutter texels, which are only guesses.
 const KEEP_FILLED: f32 = 0.005;
@@ -32,7 +41,7 @@ pub fn close(geometry: &Geometry, atlas: &Atlas, pixels: &mut [Rgb], baked: &[bo
     let mut rows: Vec<[(usize, f32); 8]> = Vec::new();
     for seam in &atlas.seams {
         if active(atlas.triangle_chart[seam.a.0 as usize]) && active(atlas.triangle_chart[seam.b.0 as usize]) {
-            rows.extend(points(geometry, atlas, seam));
+            rows.extend(points(geometry, atlas, seam, pixels));
         }
     }
     for (pixel, _) in rows.iter().flatten() {
@@ -42,7 +51,8 @@ pub fn close(geometry: &Geometry, atlas: &Atlas, pixels: &mut [Rgb], baked: &[bo
         *index = i as u32;
     }
     let rows: Vec<Row> = rows.iter().map(|r| r.map(|(pixel, w)| (unknowns[&pixel], w))).collect();
-    let keep: Vec<f32> = unknowns.keys().map(|&p| if baked[p] { KEEP_BAKED } else { KEEP_FILLED }).collect();
+    let firmness = firmness(atlas);
+    let keep: Vec<f32> = unknowns.keys().map(|&p| firmness[p] * if baked[p] { KEEP_BAKED } else { KEEP_FILLED }).collect();
     let start: Vec<Rgb> = unknowns.keys().map(|&p| pixels[p]).collect();
     let solution = solve(&rows, &keep, &start);
     for (&pixel, value) in unknowns.keys().zip(solution) {
@@ -51,8 +61,21 @@ pub fn close(geometry: &Geometry, atlas: &Atlas, pixels: &mut [Rgb], baked: &[bo
     }
 }
 
+/// How much more than in a wide chart each pixel holds on to its light.
+fn firmness(atlas: &Atlas) -> Vec<f32> {
+    let mut out = vec![1.0; (atlas.size[0] * atlas.size[1]) as usize];
+    for chart in &atlas.charts {
+        let narrow = (WIDE_CHART / chart.size[0].min(chart.size[1]) as f32).max(1.0);
+        for y in chart.corner[1] - GUTTER..chart.corner[1] + chart.size[1] + GUTTER {
+            let row = (y * atlas.size[0] + chart.corner[0] - GUTTER) as usize;
+            out[row..row + (chart.size[0] + 2 * GUTTER) as usize].fill(narrow.powi(3));
+        }
+    }
+    out
+}
+
 /// Points along a seam, each as the difference of two bilinear lookups.
-fn points(geometry: &Geometry, atlas: &Atlas, seam: &Seam) -> Vec<[(usize, f32); 8]> {
+fn points(geometry: &Geometry, atlas: &Atlas, seam: &Seam, pixels: &[Rgb]) -> Vec<[(usize, f32); 8]> {
     let edge = |(t, e): (u32, u8), reverse: bool| -> Option<[Vec2; 2]> {
         let c = atlas.corners(geometry, t)?;
         let (from, to) = (c[e as usize % 3], c[(e as usize + 1) % 3]);
@@ -67,6 +90,10 @@ fn points(geometry: &Geometry, atlas: &Atlas, seam: &Seam) -> Vec<[(usize, f32);
         .filter_map(|i| {
             let t = (i as f32 + 0.5) / count as f32;
             let (pa, pb) = (bilinear(a[0].lerp(a[1], t), atlas.size)?, bilinear(b[0].lerp(b[1], t), atlas.size)?);
+            let light = |taps: &[(usize, f32); 4]| taps.iter().map(|&(i, w)| luminance(pixels[i]) * w).sum::<f32>();
+            let (la, lb) = (light(&pa), light(&pb));
+            let jump = (la - lb).abs() / (0.5 * (la + lb)).max(f32::MIN_POSITIVE) / HALF_JUMP;
+            let weight = weight / (1.0 + jump * jump);
             let mut row = [(0, 0.0); 8];
             for k in 0..4 {
                 row[k] = (pa[k].0, pa[k].1 * weight);
@@ -129,7 +156,7 @@ mod tests {
     use super::super::texels::Texels;
     use super::super::{AtlasParams, fill, testing};
     use super::*;
-    use crate::math::{hash_words, luminance};
+    use crate::math::hash_words;
     use glam::Vec3;
 
     /// A sphere lit by a smooth function of the normal, plus noise; mean and largest jump across its seams.
@@ -176,6 +203,27 @@ mod tests {
         }
         assert!(count > 500);
         (sum / count as f32, largest)
+    }
+
+    #[test]
+    fn a_lit_side_does_not_bleed_into_a_dark_one() {
+        // A small sphere whose charts are three texels wide, each in a light of its own.
+        let mut geometry = Geometry::default();
+        testing::sphere(&mut geometry, Vec3::ZERO, 0.05, 16);
+        let atlas = Atlas::build(&geometry, &|_| true, &AtlasParams { texel: Some(0.1), ..Default::default() }).unwrap();
+        let texels = Texels::new(&geometry, &atlas);
+        let mut pixels = vec![Rgb::ZERO; (atlas.size[0] * atlas.size[1]) as usize];
+        let mut baked = vec![false; pixels.len()];
+        for i in 0..texels.len() {
+            pixels[texels.pixel[i] as usize] = Rgb::splat(if texels.chart[i] % 2 == 0 { 1.0 } else { 0.01 });
+            baked[texels.pixel[i] as usize] = true;
+        }
+        fill::dilate(&atlas, &mut pixels, &baked);
+        close(&geometry, &atlas, &mut pixels, &baked, &|_| true);
+        let dark: Vec<f32> =
+            (0..texels.len()).filter(|&i| texels.chart[i] % 2 == 1).map(|i| pixels[texels.pixel[i] as usize].x).collect();
+        let (mean, worst) = (dark.iter().sum::<f32>() / dark.len() as f32, dark.iter().copied().fold(0.0, f32::max));
+        assert!(mean < 0.02 && worst < 0.1, "mean {mean}, worst {worst}");
     }
 
     #[test]

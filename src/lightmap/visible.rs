@@ -3,8 +3,8 @@
 //! Light maps leak where a texel reaches under a box, through a wall or behind a picture: the hidden part is dark (or lit
 //! by another room) and the texel's mean smears it over the visible part. *Ours*, in order:
 //! - a sample whose first ray meets the inner side of a solid is *inside* it and does not count;
-//! - a sample whose every ray ends within [`CONTACT_TEXELS`] is pressed against something: it counts only where its chart
-//!   has nothing better;
+//! - a sample whose every ray ends within [`CONTACT_TEXELS`] is pressed against something: it counts only where its texel
+//!   has nothing better, and such a texel takes the light of its neighbours in the open, if it has any;
 //! - the others fall into regions that can see each other just above the surface. Of several regions a texel keeps the
 //!   largest that gets any light, and of those one from which the sensor is seen in two segments, if there is one.
 
