@@ -106,7 +106,7 @@ impl Preset {
                 spp: 64,
                 lightmap_spp: 32,
                 lightmap_texels: 150_000,
-                size: [480, 270],
+                size: [320, 180],
                 supersample: 1,
                 reference_spp: 32,
                 all_texels: false,
