@@ -104,7 +104,7 @@ impl Preset {
                 probes: 12,
                 probe_size: [256, 128],
                 spp: 64,
-                lightmap_spp: 32,
+                lightmap_spp: 96,
                 lightmap_texels: 150_000,
                 size: [320, 180],
                 supersample: 1,
