@@ -32,7 +32,7 @@ pub struct Object {
     pub material: u32,
     /// Index into `Scene::emitters`.
     pub emitter: Option<u32>,
-    /// Shade with the geometric normal (`faceNormals`, or a file without normals).
+    /// Shade with the geometric normal (`face_normals`). A file without normals has smooth ones otherwise.
     pub face_normals: bool,
     /// Whether the file gave texture coordinates.
     pub has_uvs: bool,

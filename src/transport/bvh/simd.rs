@@ -61,6 +61,8 @@ pub trait Simd: Copy {
     fn compress(self, mask: u32) -> Self::I;
     /// As `le`, of both operands in the order `by`.
     fn le_permuted(self, a: Self::F, b: Self::F, by: Self::I) -> u32;
+    /// Tells the caches that `item` will be wanted soon.
+    fn prefetch<T>(self, _item: &T) {}
 }
 
 /// Plain arrays.
@@ -239,6 +241,14 @@ mod x86 {
         fn compress(self, mask: u32) -> __m256i {
             let lanes = &COMPRESS[mask as usize & 255];
             unsafe { _mm256_cvtepu8_epi32(_mm_loadl_epi64(lanes.as_ptr().cast())) }
+        }
+        #[inline(always)]
+        fn prefetch<T>(self, item: &T) {
+            for offset in (0..size_of::<T>()).step_by(64) {
+                let line = std::ptr::from_ref(item).cast::<i8>().wrapping_add(offset);
+                // A hint: it reads nothing, whatever the address.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(line) }
+            }
         }
         #[inline(always)]
         fn le_permuted(self, a: __m256, b: __m256, by: __m256i) -> u32 {
