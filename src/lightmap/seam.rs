@@ -215,7 +215,7 @@ mod tests {
         let mut pixels = vec![Rgb::ZERO; (atlas.size[0] * atlas.size[1]) as usize];
         let mut baked = vec![false; pixels.len()];
         for i in 0..texels.len() {
-            pixels[texels.pixel[i] as usize] = Rgb::splat(if texels.chart[i] % 2 == 0 { 1.0 } else { 0.01 });
+            pixels[texels.pixel[i] as usize] = Rgb::splat(if texels.chart[i].is_multiple_of(2) { 1.0 } else { 0.01 });
             baked[texels.pixel[i] as usize] = true;
         }
         fill::dilate(&atlas, &mut pixels, &baked);
