@@ -227,6 +227,28 @@ fn shapes_that_refer_to_one_bsdf_share_its_material() {
     assert_eq!([&scene.materials[0].name, &scene.materials[1].name], ["d", "default"]);
 }
 
+/// Mitsuba 3.9.1, `ray_intersect` under a mirroring `to_world`: a sphere's normals turn inwards, a cylinder's do not.
+#[test]
+fn mirrored_spheres_face_inwards() {
+    let outward = |shape: &str, flip: bool, x: f32| {
+        let scene = xml(&format!(
+            "<shape type='{shape}'><boolean name='flip_normals' value='{flip}'/>
+             <transform name='to_world'><scale x='{x}'/></transform></shape><emitter type='constant'/>"
+        ));
+        let g = &scene.geometry;
+        let radial = |t: u32| g.corners(t)[0].with_z(0.0);
+        let side = (0..g.triangles.len() as u32).map(|t| g.area_normal(t).dot(radial(t))).sum::<f32>();
+        let shading = (0..g.positions.len()).map(|i| g.normals[i].dot(g.positions[i].with_z(0.0))).sum::<f32>();
+        assert_eq!(side > 0.0, shading > 0.0, "{shape}: winding and vertex normals disagree");
+        side > 0.0
+    };
+    for flip in [false, true] {
+        assert_eq!(outward("sphere", flip, 1.0), !flip);
+        assert_eq!(outward("sphere", flip, -1.0), flip);
+        assert_eq!(outward("cylinder", flip, -1.0), !flip);
+    }
+}
+
 #[test]
 fn parameters_includes_and_paths_resolve() {
     let dir = folder();

@@ -23,7 +23,9 @@ impl<'a> Builder<'a> {
         };
         let mesh = self.mesh(p)?;
         let to_world = self.placed(p)?;
-        let flip = p.bool("flip_normals", false)?;
+        // Mitsuba takes a mirrored sphere for one of negative radius, and its other shapes not.
+        let inside_out = node.plugin == "sphere" && to_world.determinant() < 0.0;
+        let flip = p.bool("flip_normals", false)? != inside_out;
         let face = p.bool("face_normals", false)?;
         let material = match p.children(Kind::Bsdf)?.as_slice() {
             [] => self.default_material(),
