@@ -107,6 +107,19 @@ fn run_makes_frames_and_a_report_and_threads_do_not_change_a_bit() {
 }
 
 #[test]
+fn run_compares_the_layers_that_a_reference_has() {
+    let f = Folder::new();
+    std::fs::create_dir(f.at("given")).unwrap();
+    let message = f.refusal(&format!("{RUN} --reference given"));
+    assert!(message.contains("given: found no EXR file"), "{message}");
+    for frame in ["0000.exr", "0001.exr"] {
+        ExrImage::new(32, 18).with_rgb("glossy", &[glam::Vec3::ZERO; 32 * 18]).write(&f.at("given").join(frame)).unwrap();
+    }
+    f.figures(&format!("{RUN} --reference given"));
+    assert!(f.at("out/report-glossy/metrics.json").exists() && !f.at("out/report").exists());
+}
+
+#[test]
 fn run_again_does_only_what_is_missing() {
     let f = Folder::new();
     f.figures(RUN);

@@ -163,8 +163,8 @@ fn pairs(a: &Path, b: &Path) -> anyhow::Result<Vec<Pair>> {
     }
 }
 
-/// Names of the EXR files in a folder, sorted.
-fn frames(folder: &Path) -> anyhow::Result<Vec<String>> {
+/// Names of the EXR files in a folder, sorted; at least one.
+pub fn frames(folder: &Path) -> anyhow::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
         let path = entry.with_context(|| folder.display().to_string())?.path();

@@ -2,9 +2,10 @@
 
 use crate::common::{Common, Outcome, parse_size};
 use crate::views::{FrameList, parse_frames};
-use crate::{Cli, dispatch};
+use crate::{Cli, compare, dispatch};
 use anyhow::Context;
 use clap::Parser;
+use reprobe::io::ExrImage;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -180,7 +181,25 @@ fn size_text(size: [u32; 2]) -> String {
     format!("{}x{}", size[0], size[1])
 }
 
-fn stages(args: &Args, common: &Common) -> Vec<Stage> {
+/// A comparison: the layer, the folder of its report, and what a person calls it.
+type Comparison = (Option<&'static str>, &'static str, &'static str);
+
+/// The whole frame and the glossy layer, of which a given reference may have one alone.
+fn comparisons(args: &Args) -> anyhow::Result<Vec<Comparison>> {
+    if args.no_reference {
+        return Ok(Vec::new());
+    }
+    let mut list = vec![(None, "report", "whole frame"), (Some("glossy"), "report-glossy", "glossy layer")];
+    if let Some(folder) = &args.reference {
+        let first = folder.join(&compare::frames(folder)?[0]);
+        let frame = ExrImage::read(&first)?;
+        list.retain(|(layer, ..)| frame.rgb(&first, layer.unwrap_or("")).is_ok());
+        anyhow::ensure!(!list.is_empty(), "{}: found neither R, G, B nor glossy.R, glossy.G, glossy.B", first.display());
+    }
+    Ok(list)
+}
+
+fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage> {
     let preset = args.preset.settings();
     let out = |name: &str| args.output.join(name);
     let path = args.path.as_ref().map(|p| p.display());
@@ -249,12 +268,12 @@ fn stages(args: &Args, common: &Common) -> Vec<Stage> {
                 .option("--output", reference.display()),
         );
     }
-    for (layer, report) in [(None, "report"), (Some("glossy"), "report-glossy")] {
+    for (layer, report, _) in comparisons {
         list.push(
             Stage::new("compare")
                 .path(&out("frames"))
                 .path(&reference)
-                .optional("--layer", layer)
+                .optional("--layer", *layer)
                 .option("--output", out(report).display())
                 .flag("--quiet", common.quiet),
         );
@@ -264,7 +283,8 @@ fn stages(args: &Args, common: &Common) -> Vec<Stage> {
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let began = Instant::now();
-    let stages = stages(args, common);
+    let comparisons = comparisons(args)?;
+    let stages = stages(args, common, &comparisons);
     if args.dry_run {
         let lines: Vec<String> = stages.iter().map(Stage::command_line).collect();
         return Ok(Outcome { summary: lines.join("\n"), figures: json!({ "commands": lines }), ..Outcome::default() });
@@ -285,11 +305,9 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     }
     let out = args.output.display();
     let seconds = began.elapsed().as_secs_f64();
-    let report = if args.no_reference {
-        String::new()
-    } else {
-        format!("\nReport: {out}/report/index.html (whole frame), {out}/report-glossy/index.html (glossy layer)")
-    };
+    let reports: Vec<String> =
+        comparisons.iter().map(|(_, folder, what)| format!("{out}/{folder}/index.html ({what})")).collect();
+    let report = if reports.is_empty() { String::new() } else { format!("\nReport: {}", reports.join(", ")) };
     Ok(Outcome {
         summary: format!("Frames: {out}/frames/NNNN.exr{report}\nDone in {seconds:.0} s."),
         figures: json!({ "stages": figures, "seconds": seconds }),
