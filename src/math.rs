@@ -56,6 +56,12 @@ pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
     n * (2.0 * n.dot(w)) - w
 }
 
+/// Largest integer not above `x`, saturating. Without SSE4.1, which the baseline lacks, `f32::floor` is a call.
+pub fn floor(x: f32) -> i64 {
+    let i = x as i64;
+    i.saturating_sub(i64::from(i as f32 > x))
+}
+
 /// World direction of a lat-long coordinate: `u` in [0, 1) is the longitude from -Z over +X,
 /// `v` in [0, 1] the polar angle from +Y (the convention of Mitsuba's `envmap`).
 /// Inverse of [`lat_long_from_direction`].

@@ -286,7 +286,7 @@ fn a_turned_sky_lights_from_where_it_is_seen() {
     // Upper half bright, turned so that its zenith is +X: a wall facing +X gets it all, one facing -X the dark half.
     let rows = 64;
     let pixel = |y: usize| if y < rows / 2 { Rgb::splat(2.0) } else { Rgb::ZERO };
-    let image = reprobe::scene::texture::Image { width: 4, height: rows, pixels: (0..4 * rows).map(|i| pixel(i / 4)).collect() };
+    let image = reprobe::scene::image::Image::new(4, rows, (0..4 * rows).map(|i| pixel(i / 4)).collect());
     let image = std::sync::Arc::new(image);
     let to_world = Affine3A::from_rotation_z(-std::f32::consts::FRAC_PI_2);
     for (side, expected) in [(1.0, 1.0), (-1.0, 0.0)] {

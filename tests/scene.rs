@@ -188,7 +188,7 @@ fn every_plugin_and_spelling_loads_without_a_warning() {
     let Bsdf::Plastic(plastic) = &scene.materials[1].bsdf else { panic!() };
     assert_eq!((plastic.params.int_ior, plastic.params.ext_ior), (1.333, 1.000_277));
     let Texture::Bitmap(bitmap) = &plastic.params.diffuse_reflectance else { panic!() };
-    assert_eq!(bitmap.image.pixels[1].x, 60.0 / 255.0, "raw");
+    assert_eq!(bitmap.image.pixel(1, 0).x, 60.0 / 255.0, "raw");
     assert_eq!(bitmap.to_uv.transform_point2(Vec2::ONE), Vec2::new(2.0, 3.0));
     // Mitsuba 3.9.1 at its default film of 768x576: 35 mm film's diagonal at a focal length of 35 mm.
     let Emitter::Spot { direction, cutoff_rad, beam_rad, .. } = scene.emitters[0] else { panic!() };

@@ -1,9 +1,8 @@
 //! The files that a scene names: each is read once, all in parallel, and hashed.
 
-use super::image;
+use super::image::{self, Image};
 use super::params::Ids;
 use super::shapes::{self, Mesh};
-use super::texture::Image;
 use super::tree::{Kind, Node, Param, Value};
 use crate::{Error, Result};
 use rayon::prelude::*;

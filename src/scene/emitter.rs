@@ -1,7 +1,7 @@
 //! Emitters of the scene file.
 
 use super::Texture;
-use super::texture::Image;
+use super::image::Image;
 use crate::math::Rgb;
 use glam::{Affine3A, Vec3};
 use std::sync::Arc;

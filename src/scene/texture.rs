@@ -3,7 +3,8 @@
 //! Lookups are Mitsuba 3's: texel (i, j) of a bitmap has its centre at ((i + 0.5) / width, (j + 0.5) / height), and
 //! row 0 of the file lies at v = 0 (OBJ files have v upwards: their loader turns it).
 
-use crate::math::Rgb;
+use super::image::Image;
+use crate::math::{Rgb, floor};
 use glam::{Affine2, Vec2};
 use std::sync::Arc;
 
@@ -51,17 +52,6 @@ pub enum Wrap {
     Clamp,
 }
 
-/// Linear RGB pixels, row 0 at the top of the file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Image {
-    /// Width in pixels.
-    pub width: usize,
-    /// Height in pixels.
-    pub height: usize,
-    /// Rows from the top, each from the left.
-    pub pixels: Vec<Rgb>,
-}
-
 impl Texture {
     /// Value at a surface's uv.
     pub fn eval(&self, uv: Vec2) -> Rgb {
@@ -95,30 +85,35 @@ impl Bitmap {
         if !uv.is_finite() {
             return Rgb::ZERO;
         }
-        let size = Vec2::new(self.image.width as f32, self.image.height as f32);
+        let [width, height] = [self.image.width as i64, self.image.height as i64];
+        let column = |x: i64| self.wrap.index(x, width);
+        let row = |y: i64| self.wrap.index(y, height);
+        let p = uv * Vec2::new(width as f32, height as f32);
         if self.nearest {
-            return self.texel((uv * size).floor()) * self.scale;
+            return self.image.pixel(column(floor(p.x)), row(floor(p.y))) * self.scale;
         }
-        let p = uv * size - 0.5;
-        let corner = p.floor();
-        let t = p - corner;
-        let at = |dx: f32, dy: f32| self.texel(corner + Vec2::new(dx, dy));
-        let upper = at(0.0, 0.0) * (1.0 - t.x) + at(1.0, 0.0) * t.x;
-        let lower = at(0.0, 1.0) * (1.0 - t.x) + at(1.0, 1.0) * t.x;
-        (upper * (1.0 - t.y) + lower * t.y) * self.scale
+        let p = p - 0.5;
+        let (x, y) = (floor(p.x), floor(p.y));
+        let t = p - Vec2::new(x as f32, y as f32);
+        let (x, y) = ([column(x), column(x.saturating_add(1))], [row(y), row(y.saturating_add(1))]);
+        let across = |y: usize| self.image.pixel(x[0], y) * (1.0 - t.x) + self.image.pixel(x[1], y) * t.x;
+        (across(y[0]) * (1.0 - t.y) + across(y[1]) * t.y) * self.scale
     }
 
     /// The pixel at the whole coordinates `p`, which may lie outside; `scale` is not in it.
     pub(crate) fn texel(&self, p: Vec2) -> Rgb {
         let x = self.wrap.index(p.x as i64, self.image.width as i64);
         let y = self.wrap.index(p.y as i64, self.image.height as i64);
-        self.image.pixels[y * self.image.width + x]
+        self.image.pixel(x, y)
     }
 }
 
 impl Wrap {
     /// The pixel that stands for the pixel `i` of an endless row, of `n` that there are.
     fn index(self, i: i64, n: i64) -> usize {
+        if (0..n).contains(&i) {
+            return i as usize;
+        }
         let wrapped = match self {
             Self::Clamp => i.clamp(0, n - 1),
             Self::Repeat => i.rem_euclid(n),
@@ -138,7 +133,7 @@ mod tests {
     fn bitmap(wrap: Wrap, nearest: bool) -> Bitmap {
         let v = |x: f32| Rgb::splat(x);
         let pixels = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0].map(v).to_vec();
-        let image = Arc::new(Image { width: 4, height: 3, pixels });
+        let image = Arc::new(Image::new(4, 3, pixels));
         Bitmap { image, to_uv: Affine2::IDENTITY, nearest, wrap, scale: 1.0 }
     }
 

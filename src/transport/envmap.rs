@@ -5,7 +5,7 @@
 //! corner values are luminance times sine at the pixels.
 
 use crate::math::{Rgb, direction_from_lat_long, lat_long_from_direction, luminance};
-use crate::scene::texture::Image;
+use crate::scene::image::Image;
 use glam::{Affine3A, Mat3, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -115,7 +115,7 @@ impl Envmap {
     }
 
     fn radiance(&self, place: &Place) -> Rgb {
-        let pixel = |x: usize, y: usize| self.image.pixels[y * self.image.width + x];
+        let pixel = |x: usize, y: usize| self.image.pixel(x, y);
         let row = |y: usize| pixel(place.x[0], y).lerp(pixel(place.x[1], y), place.at.x);
         row(place.y[0]).lerp(row(place.y[1]), place.at.y) * self.scale
     }
@@ -123,7 +123,7 @@ impl Envmap {
     /// Luminance times sine at a pixel. (An image of one or two rows is nothing but poles: no sine there.)
     fn corner(&self, x: usize, y: usize) -> f32 {
         let sine = if self.image.height < 3 { 1.0 } else { (PI * y as f32 / (self.image.height - 1) as f32).sin() };
-        (luminance(self.image.pixels[y * self.image.width + x]) * sine).max(0.0)
+        (luminance(self.image.pixel(x, y)) * sine).max(0.0)
     }
 
     fn corners(&self, place: &Place) -> [[f32; 2]; 2] {
@@ -193,7 +193,7 @@ mod tests {
             (x, y) if x >= 12 => Rgb::ZERO * y as f32,
             (x, y) => Rgb::new(0.2 + 0.1 * x as f32, 0.5, 0.1 * y as f32),
         };
-        let image = Image { width, height, pixels: (0..width * height).map(pixel).collect() };
+        let image = Image::new(width, height, (0..width * height).map(pixel).collect());
         Envmap::new(&Arc::new(image), 2.0, turn).unwrap()
     }
 
@@ -272,7 +272,7 @@ mod tests {
 
     #[test]
     fn a_black_or_empty_image_is_no_light() {
-        let image = |width, height, c| Arc::new(Image { width, height, pixels: vec![c; width * height] });
+        let image = |width, height, c| Arc::new(Image::new(width, height, vec![c; width * height]));
         assert!(Envmap::new(&image(4, 2, Rgb::ZERO), 1.0, &Affine3A::IDENTITY).is_none());
         assert!(Envmap::new(&image(0, 0, Rgb::ONE), 1.0, &Affine3A::IDENTITY).is_none());
         let one = Envmap::new(&image(1, 1, Rgb::ONE), 3.0, &Affine3A::IDENTITY).unwrap();

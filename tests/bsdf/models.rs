@@ -3,7 +3,8 @@
 use glam::{Affine2, Vec2, Vec3};
 use reprobe::math::{Frame, Rgb};
 use reprobe::scene::Texture;
-use reprobe::scene::texture::{Bitmap, Image, Wrap};
+use reprobe::scene::image::Image;
+use reprobe::scene::texture::{Bitmap, Wrap};
 use reprobe::transport::Surface;
 use reprobe::transport::bsdf::*;
 use std::sync::Arc;
@@ -39,7 +40,7 @@ pub fn surface(uv: [f32; 2]) -> Surface {
 pub fn bitmap(offset: f32, wrap: Wrap, to_uv: Affine2) -> Texture {
     let value = |x: usize, y: usize, c: usize| ((3 * x + 5 * y + 2 * c) % 7) as f32 / 10.0 + offset;
     let pixels = (0..12).map(|i| (i % 4, i / 4)).map(|(x, y)| Vec3::new(value(x, y, 0), value(x, y, 1), value(x, y, 2)));
-    let image = Arc::new(Image { width: 4, height: 3, pixels: pixels.collect() });
+    let image = Arc::new(Image::new(4, 3, pixels.collect()));
     Texture::Bitmap(Bitmap { image, to_uv, nearest: false, wrap, scale: 1.0 })
 }
 
