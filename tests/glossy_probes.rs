@@ -6,6 +6,7 @@ use reprobe::probe::bake::{BakeParams, bake_glossy, probe_geometry};
 use reprobe::probe::file::Probe;
 use reprobe::probe::qhmap::ParameterMap;
 use reprobe::progress::Silent;
+use reprobe::render::candidates::candidates;
 use reprobe::render::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
 use reprobe::render::gbuffer::{GBuffer, gbuffer};
 use reprobe::render::mirror::{Reflected, mirror_hit};
@@ -78,8 +79,10 @@ impl Setup {
     }
 
     fn gather(&self, view: &GBuffer, reflected: &[Reflected], params: &GatherParams) -> Vec<Gathered> {
+        let candidates: Vec<_> = self.probes.iter().map(|p| candidates(&self.world.scene.geometry, p)).collect();
+        let probes = self.probes.iter().zip(&candidates).enumerate();
         let weighted: Vec<_> =
-            self.probes.iter().enumerate().map(|(index, probe)| WeightedProbe { index, probe, weight: 0.125 }).collect();
+            probes.map(|(index, (probe, candidates))| WeightedProbe { index, probe, candidates, weight: 0.125 }).collect();
         gather(&self.world, view, reflected, &weighted, 0.5, params)
     }
 

@@ -150,6 +150,7 @@ fn inputs_from_another_scene_or_another_run_are_refused() {
     f.figures(RUN);
     let message = f.refusal(&render("--supersample 2"));
     assert!(message.contains("other views") && message.contains("--for-path"), "{message}");
+    f.figures(&render("--frames 1"));
     let message = f.refusal(&render("--set gather.falof=3"));
     assert!(message.contains("gather.falloff=8"), "{message}");
 

@@ -5,7 +5,7 @@
 
 use super::qhmap::ParameterMap;
 use crate::io::{ExrImage, Provenance};
-use crate::math::Rgb;
+use crate::math::{Rgb, floor};
 use crate::render::mirror::{NOTHING, Reflected, SKY};
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
@@ -105,12 +105,18 @@ impl Probe {
 
     /// Texel that holds the continuous coordinate `x` (wraps in u, clamps in v).
     pub fn texel(&self, x: Vec2) -> &Texel {
-        &self.texels[self.index(x.x.floor() as i32, x.y.floor() as i32)]
+        &self.texels[self.index_at(x)]
+    }
+
+    /// Index of the texel that holds the continuous coordinate `x` (wraps in u, clamps in v).
+    pub fn index_at(&self, x: Vec2) -> usize {
+        self.index(floor(x.x) as i32, floor(x.y) as i32)
     }
 
     /// Index of an integer texel coordinate (wraps in u, clamps in v).
     pub fn index(&self, x: i32, y: i32) -> usize {
-        let x = x.rem_euclid(self.size[0] as i32) as usize;
+        let width = self.size[0] as i32;
+        let x = if (0..width).contains(&x) { x } else { x.rem_euclid(width) } as usize;
         let y = y.clamp(0, self.size[1] as i32 - 1) as usize;
         y * self.size[0] as usize + x
     }

@@ -9,6 +9,7 @@ use super::placement::ProbeGrid;
 use super::qhmap::ParameterMap;
 use crate::Result;
 use crate::progress::Progress;
+use crate::render::candidates::NearCandidates;
 use crate::render::gather::{GatherParams, WeightedProbe, best_samples, footprint_texels};
 use crate::render::gbuffer::gbuffer;
 use crate::render::glossy_probes::nearest_probes;
@@ -33,8 +34,8 @@ pub struct Wanted {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Views {
-    /// blake3 of the cameras' numbers, hex.
-    pub cameras: String,
+    /// blake3 of each camera's numbers, hex.
+    pub cameras: Vec<String>,
     /// Rays a pixel, along one side.
     pub supersample: u32,
     /// How the texels are chosen; what is then made of their colours is set to the default.
@@ -44,16 +45,23 @@ pub struct Views {
 impl Views {
     /// The views of `cameras`.
     pub fn new(cameras: &[Camera], supersample: u32, gather: &GatherParams) -> Self {
-        let mut hash = blake3::Hasher::new();
-        for c in cameras {
-            let numbers = c.to_world.to_cols_array();
-            hash.update(bytemuck::cast_slice(&numbers));
+        let hash = |c: &Camera| {
+            let mut hash = blake3::Hasher::new();
+            hash.update(bytemuck::cast_slice(&c.to_world.to_cols_array()));
             hash.update(&c.fov_x.to_le_bytes());
             hash.update(bytemuck::cast_slice(&c.size));
-        }
+            hash.finalize().to_hex().to_string()
+        };
         let GatherParams { falloff, bilinear, albedo_ratio, .. } = GatherParams::default();
         let gather = GatherParams { falloff, bilinear, albedo_ratio, ..gather.clone() };
-        Self { cameras: hash.finalize().to_hex().to_string(), supersample, gather }
+        Self { cameras: cameras.iter().map(hash).collect(), supersample, gather }
+    }
+
+    /// Whether a bake for these views has all texels that `other` needs.
+    pub fn serve(&self, other: &Views) -> bool {
+        self.supersample == other.supersample
+            && self.gather == other.gather
+            && other.cameras.iter().all(|c| self.cameras.contains(c))
     }
 }
 
@@ -68,6 +76,7 @@ pub fn wanted_texels(
     progress: &dyn Progress,
 ) -> Result<BTreeMap<usize, Wanted>> {
     let mut probes: BTreeMap<usize, (Probe, Vec<AtomicBool>)> = BTreeMap::new();
+    let mut candidates = NearCandidates::default();
     progress.start("texels that the views use", cameras.len() as u64);
     for camera in cameras {
         let near = nearest_probes(grid, camera.position(), views.gather.probes);
@@ -78,12 +87,16 @@ pub fn wanted_texels(
                 entry.insert((probe, flags));
             }
         }
-        let weighted: Vec<_> =
-            near.iter().map(|&(index, weight)| WeightedProbe { index, probe: &probes[&index].0, weight }).collect();
+        let indexed: Vec<_> = near.iter().map(|(index, _)| (*index, &probes[index].0)).collect();
+        candidates.update(&world.scene.geometry, &indexed);
+        let weighted: Vec<_> = near
+            .iter()
+            .map(|&(index, weight)| WeightedProbe { index, probe: &probes[&index].0, candidates: candidates.of(index), weight })
+            .collect();
         let fine = Camera { size: camera.size.map(|s| s * views.supersample), ..camera.clone() };
         gbuffer(world, curvature, &fine).pixels.par_iter().flatten().filter(|p| p.alpha.is_some()).for_each(|pixel| {
             let reflected = mirror_hit(world, &pixel.surface, pixel.wo);
-            let samples = best_samples(world, fine.position(), pixel, reflected, &weighted, &views.gather);
+            let samples = best_samples(fine.position(), pixel, reflected, &weighted, &views.gather);
             for (w, sample) in weighted.iter().zip(samples) {
                 let Some(sample) = sample else { continue };
                 for texel in footprint_texels(w.probe, sample.texel) {

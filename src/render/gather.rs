@@ -5,12 +5,12 @@
 //!
 //! *Ours*: colour is fetched at the fractional coordinate, geometry at the texel that holds it.
 
+use super::candidates::Candidate;
 use super::gbuffer::{GBuffer, Pixel};
 use super::mirror::{NOTHING, Reflected};
 use super::perturb::{PerturbParams, Perturbation};
 use crate::math::Rgb;
-use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
-use crate::scene::Geometry;
+use crate::probe::file::{Probe, Texel};
 use crate::transport::World;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -84,13 +84,13 @@ impl GatherParams {
     }
 }
 
-/// What the energy compares: reflector position r, its normal n and the reflected hit R, in the probe or in the view.
+/// What the energy compares: the reflector's normal n, the reflected ray and its hit R, in the probe or in the view.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflection {
-    /// r, world position on the reflector.
-    pub position: Vec3,
     /// n, unit shading normal facing the viewer.
     pub normal: Vec3,
+    /// Unit direction of the reflected ray, from the reflector's position r to R.
+    pub direction: Vec3,
     /// R, what a mirror there shows.
     pub reflected: Reflected,
 }
@@ -106,7 +106,7 @@ pub fn energy(view: &Reflection, probe: &Reflection, material_penalty: f32) -> f
     let s_a = if view.reflected.material == probe.reflected.material { 1.0 } else { material_penalty };
     let s_b = reflected_distance(&view.reflected, &probe.reflected);
     let s_c = 1.0 - view.normal.dot(probe.normal);
-    let s_d = 1.0 - view.reflected.direction_from(view.position).dot(probe.reflected.direction_from(probe.position));
+    let s_d = 1.0 - view.direction.dot(probe.direction);
     s_a * (s_b.min(1.0) + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0))
 }
 
@@ -135,6 +135,8 @@ pub struct WeightedProbe<'a> {
     pub index: usize,
     /// The probe.
     pub probe: &'a Probe,
+    /// Its texels, ready for the search.
+    pub candidates: &'a [Candidate],
     /// t_i.
     pub weight: f32,
 }
@@ -174,21 +176,19 @@ pub struct Sample {
 
 /// The sample of least energy of each of `probes` (at most eight), for a glossy pixel.
 pub fn best_samples(
-    world: &World,
     eye: Vec3,
     pixel: &Pixel,
     reflected: Reflected,
     probes: &[WeightedProbe],
     params: &GatherParams,
 ) -> [Option<Sample>; 8] {
-    let at_view = Reflection { position: pixel.surface.p, normal: pixel.normal, reflected };
-    let (r, n) = (at_view.position, at_view.normal);
+    let (r, n) = (pixel.surface.p, pixel.normal);
+    let at_view = Reflection { normal: n, direction: reflected.direction_from(r), reflected };
     let path = Perturbation::new(eye, r, n, reflected.distance_from(r), &pixel.curvature, &params.perturb);
     let mut samples = [None; 8];
     for (sample, w) in samples.iter_mut().zip(probes) {
         let x = path.reflection_point(w.probe.position);
-        *sample =
-            search(world, w.probe, x, pixel.surface.material, &at_view, params).map(|(energy, texel)| Sample { energy, texel });
+        *sample = search(w, x, pixel.surface.material, &at_view, params).map(|(energy, texel)| Sample { energy, texel });
     }
     samples
 }
@@ -202,7 +202,7 @@ fn gather_pixel(
     roughness_scale: f32,
     params: &GatherParams,
 ) -> Gathered {
-    let samples = best_samples(world, view.camera.position(), pixel, reflected, probes, params);
+    let samples = best_samples(view.camera.position(), pixel, reflected, probes, params);
     let found = || probes.iter().zip(&samples).filter_map(|(w, s)| s.map(|s| (w, s)));
     let Some((nearest, best)) = found().min_by(|a, b| a.1.energy.total_cmp(&b.1.energy)) else {
         return Gathered::NONE;
@@ -211,7 +211,7 @@ fn gather_pixel(
     let (mut sum, mut z) = (Rgb::ZERO, 0.0);
     for (w, sample) in found() {
         let weight = w.weight.max(MIN_TRILINEAR) * (-params.falloff * (sample.energy - best.energy)).exp();
-        let mut color = fetch(&world.scene.geometry, w.probe, sample.texel, params.bilinear);
+        let mut color = fetch(w, sample.texel, params.bilinear);
         if params.albedo_ratio {
             color *= albedo_ratio(world, pixel, w.probe, w.probe.texel(sample.texel), roughness_scale);
         }
@@ -229,14 +229,8 @@ pub fn footprint_texels(probe: &Probe, at: Vec2) -> [usize; 4] {
 
 /// The texel coordinate of least energy around the direction from the probe to `x`, coarse level first.
 /// Only texels whose reflector is of `material` count; `None` where there is none.
-fn search(
-    world: &World,
-    probe: &Probe,
-    x: Vec3,
-    material: u32,
-    at_view: &Reflection,
-    params: &GatherParams,
-) -> Option<(f32, Vec2)> {
+fn search(w: &WeightedProbe, x: Vec3, material: u32, at_view: &Reflection, params: &GatherParams) -> Option<(f32, Vec2)> {
+    let probe = w.probe;
     let direction = (x - probe.position).try_normalize()?;
     let mut centre = probe.map.texel_from_direction(direction);
     let mut best: Option<(f32, Vec2)> = None;
@@ -245,8 +239,11 @@ fn search(
         for j in -level.radius..=level.radius {
             for i in -level.radius..=level.radius {
                 let at = centre + step * Vec2::new(i as f32, j as f32);
+                let candidate = &w.candidates[probe.index_at(at)];
                 let limit = best.map_or(f32::INFINITY, |b| b.0);
-                if let Some(e) = candidate_energy(world, probe, probe.texel(at), material, at_view, limit, params) {
+                if candidate.material == material
+                    && let Some(e) = energy_below(limit, at_view, &candidate.reflection, params.material_penalty)
+                {
                     best = Some((e, at));
                 }
             }
@@ -256,65 +253,31 @@ fn search(
     best
 }
 
-/// Energy of a texel, if it is valid and below `limit`.
-fn candidate_energy(
-    world: &World,
-    probe: &Probe,
-    texel: &Texel,
-    material: u32,
-    at_view: &Reflection,
-    limit: f32,
-    params: &GatherParams,
-) -> Option<f32> {
-    if texel.triangle == NO_TRIANGLE {
+/// [`energy`] where it is below `limit`.
+fn energy_below(limit: f32, view: &Reflection, probe: &Reflection, material_penalty: f32) -> Option<f32> {
+    // The reflected hit alone rules most texels out.
+    let s_a = if view.reflected.material == probe.reflected.material { 1.0 } else { material_penalty };
+    if s_a * reflected_distance(&view.reflected, &probe.reflected).min(1.0) >= limit {
         return None;
     }
-    let geometry = &world.scene.geometry;
-    if geometry.object(texel.triangle).material != material {
-        return None;
-    }
-    let reflected = texel.reflected();
-    // The reflected hit alone often rules a texel out, before its vertices are fetched.
-    let s_a = if reflected.material == at_view.reflected.material { 1.0 } else { params.material_penalty };
-    if s_a * reflected_distance(&at_view.reflected, &reflected).min(1.0) >= limit {
-        return None;
-    }
-    let (position, normal) = reflector(geometry, texel, probe.position);
-    let e = energy(at_view, &Reflection { position, normal, reflected }, params.material_penalty);
+    let e = energy(view, probe, material_penalty);
     (e < limit).then_some(e)
 }
 
-/// r_p and n_p of a texel: position, and shading normal facing the probe.
-fn reflector(geometry: &Geometry, texel: &Texel, eye: Vec3) -> (Vec3, Vec3) {
-    let b = texel.barycentric();
-    let weights = [1.0 - b.x - b.y, b.x, b.y];
-    let [i, j, k] = geometry.triangles[texel.triangle as usize].map(|v| v as usize);
-    let mix = |v: &[Vec3]| v[i] * weights[0] + v[j] * weights[1] + v[k] * weights[2];
-    let position = mix(&geometry.positions);
-    let ng = geometry.area_normal(texel.triangle);
-    let n = if geometry.object(texel.triangle).face_normals { ng } else { mix(&geometry.normals) };
-    let n = n.try_normalize().unwrap_or(Vec3::Y);
-    let eye_side = ng.dot(eye - position) * ng.dot(n);
-    (position, if eye_side < 0.0 { -n } else { n })
-}
-
 /// Colour at a fractional texel coordinate, bilinear over those of the four texels around it that `rule` lets in.
-fn fetch(geometry: &Geometry, probe: &Probe, at: Vec2, rule: BilinearRule) -> Rgb {
-    let centre = probe.texel(at);
+fn fetch(w: &WeightedProbe, at: Vec2, rule: BilinearRule) -> Rgb {
     if rule == BilinearRule::Nearest {
-        return centre.glossy();
+        return w.probe.texel(at).glossy();
     }
-    let object = geometry.triangle_object[centre.triangle as usize];
+    let centre = &w.candidates[w.probe.index_at(at)];
     let f = (at - 0.5) - (at - 0.5).floor();
     let (mut sum, mut total) = (Rgb::ZERO, 0.0);
     let weights = [(1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y];
-    for (i, weight) in footprint_texels(probe, at).into_iter().zip(weights) {
-        let texel = &probe.texels[i];
-        let fits = texel.triangle != NO_TRIANGLE
-            && geometry.triangle_object[texel.triangle as usize] == object
-            && (rule == BilinearRule::SameReflector || texel.reflected_material == centre.reflected_material);
-        if fits {
-            sum += texel.glossy() * weight;
+    for (i, weight) in footprint_texels(w.probe, at).into_iter().zip(weights) {
+        let candidate = &w.candidates[i];
+        let same_reflected = candidate.reflection.reflected.material == centre.reflection.reflected.material;
+        if candidate.object == centre.object && (rule == BilinearRule::SameReflector || same_reflected) {
+            sum += w.probe.texels[i].glossy() * weight;
             total += weight;
         }
     }

@@ -1,5 +1,6 @@
 //! One frame by glossy probe reprojection: the method's table of contents (§5, §6).
 
+use super::candidates::NearCandidates;
 use super::composite::{Previous, diffuse_layer, downsample, reproject_previous};
 use super::filter::{FilterInput, FilterParams, filter};
 use super::footprint::{Footprint, FootprintParams, GlossyPoint};
@@ -95,6 +96,7 @@ pub struct Renderer<'a> {
     /// Parameters.
     pub params: GlossyProbeParams,
     footprint: Option<Footprint>,
+    candidates: NearCandidates,
     previous: Option<Previous>,
 }
 
@@ -108,7 +110,7 @@ impl<'a> Renderer<'a> {
         roughness_scale: f32,
     ) -> Self {
         let footprint = params.footprint.map(|f| Footprint::new(&FootprintParams { roughness_scale, ..f }));
-        Self { world, curvature, lightmap, params, footprint, previous: None }
+        Self { world, curvature, lightmap, params, footprint, candidates: NearCandidates::default(), previous: None }
     }
 
     /// Renders the next frame of a path.
@@ -122,14 +124,21 @@ impl<'a> Renderer<'a> {
             .into_iter()
             .map(|(index, weight)| Ok((index, probes.probe(index)?, weight)))
             .collect::<Result<_>>()?;
+        let indexed: Vec<_> = near.iter().map(|(index, probe, _)| (*index, &**probe)).collect();
+        self.candidates.update(&self.world.scene.geometry, &indexed);
         clock.lap("load");
         let view = gbuffer(self.world, self.curvature, &fine);
         clock.lap("gbuffer");
         let reflected = mirror_pass(self.world, &view);
         clock.lap("mirror");
         let roughness_scale = probes.set.roughness_scale;
-        let weighted: Vec<_> =
-            near.iter().map(|(index, probe, weight)| WeightedProbe { index: *index, probe, weight: *weight }).collect();
+        let weighted: Vec<_> = near
+            .iter()
+            .map(|(index, probe, weight)| {
+                let candidates = self.candidates.of(*index);
+                WeightedProbe { index: *index, probe, candidates, weight: *weight }
+            })
+            .collect();
         let mut gathered = gather(self.world, &view, &reflected, &weighted, roughness_scale, &self.params.gather);
         let unserved = reproject_previous(&view, &mut gathered, self.previous.as_ref());
         clock.lap("gather");

@@ -6,8 +6,8 @@ use crate::io::ExrImage;
 use glam::Vec3;
 
 /// Adds the passes' buffers to a frame's image, one sub-pixel (the upper left) for each pixel: `gathered.*` before the filter,
-/// `energy` (Eq. 1; -1 where no probe served), `probe` and `texel.X/Y` of the best sample, `reflected.*`, and the filter's
-/// covariance `covariance.{xx,xy,yy}` in sub-pixels².
+/// `energy` (Eq. 1; -1 where no probe served), `probe` and `texel.X/Y` of the best sample, `reflected.*`, the reflector's
+/// principal curvatures `curvature.{k1,k2}` in 1/m, and the filter's covariance `covariance.{xx,xy,yy}` in sub-pixels².
 pub fn with_passes(image: ExrImage, frame: &Frame, supersample: u32) -> ExrImage {
     let n = supersample as usize;
     let fine_width = frame.buffers.view.size()[0];
@@ -23,6 +23,7 @@ pub fn with_passes(image: ExrImage, frame: &Frame, supersample: u32) -> ExrImage
     };
     let gathered: Vec<Vec3> = at.iter().map(|&i| b.gathered[i].color).collect();
     let texel = |i: usize, axis: usize| b.gathered[i].best.map_or(-1.0, |(_, t)| t[axis]);
+    let curvature = |i: usize| b.view.pixels[i].as_ref().map_or([0.0; 2], |p| [p.curvature.k1, p.curvature.k2]);
     image
         .with_rgb("gathered", &gathered)
         .with_f32("energy", scalar(&|i| if b.gathered[i].energy.is_finite() { b.gathered[i].energy } else { -1.0 }))
@@ -33,6 +34,8 @@ pub fn with_passes(image: ExrImage, frame: &Frame, supersample: u32) -> ExrImage
         .with_f32("reflected.Y", scalar(&|i| b.reflected[i].point.y))
         .with_f32("reflected.Z", scalar(&|i| b.reflected[i].point.z))
         .with_u32("reflected.material", index(&material))
+        .with_f32("curvature.k1", scalar(&|i| curvature(i)[0]))
+        .with_f32("curvature.k2", scalar(&|i| curvature(i)[1]))
         .with_f32("covariance.xx", scalar(&|i| b.covariance[i][0]))
         .with_f32("covariance.xy", scalar(&|i| b.covariance[i][1]))
         .with_f32("covariance.yy", scalar(&|i| b.covariance[i][2]))

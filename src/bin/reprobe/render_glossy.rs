@@ -39,7 +39,8 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     let folder = args.probes.as_ref().context("--method glossy-probes needs --probes DIR, written by bake-probes")?;
     let file = args.curvature.as_ref().context("--method glossy-probes needs --curvature FILE, written by curvature")?;
     let mut probes = ProbeStore::open(folder, scene, PROBE_CACHE)?;
-    let serves = |views: &Views| *views == Views::new(&cameras, params.supersample, &params.gather);
+    let needed = Views::new(&cameras, params.supersample, &params.gather);
+    let serves = |views: &Views| views.serve(&needed);
     if !probes.set.views.as_ref().is_none_or(serves) {
         let message = "its texels were baked for other views (another path, size, --supersample or gather parameters)";
         bail!("{}: {message}; run bake-probes again for these, or without --for-path", folder.display());
