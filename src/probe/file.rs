@@ -110,15 +110,23 @@ impl Probe {
 
     /// Index of the texel that holds the continuous coordinate `x` (wraps in u, clamps in v).
     pub fn index_at(&self, x: Vec2) -> usize {
-        self.index(floor(x.x) as i32, floor(x.y) as i32)
+        self.row(x.y) + self.column(x.x)
+    }
+
+    /// Index of the first texel of the row that holds the continuous coordinate `y` (clamps).
+    pub fn row(&self, y: f32) -> usize {
+        floor(y).clamp(0, i64::from(self.size[1]) - 1) as usize * self.size[0] as usize
+    }
+
+    /// Column that holds the continuous coordinate `x` (wraps).
+    pub fn column(&self, x: f32) -> usize {
+        let (x, width) = (floor(x), i64::from(self.size[0]));
+        if (0..width).contains(&x) { x as usize } else { x.rem_euclid(width) as usize }
     }
 
     /// Index of an integer texel coordinate (wraps in u, clamps in v).
     pub fn index(&self, x: i32, y: i32) -> usize {
-        let width = self.size[0] as i32;
-        let x = if (0..width).contains(&x) { x } else { x.rem_euclid(width) } as usize;
-        let y = y.clamp(0, self.size[1] as i32 - 1) as usize;
-        y * self.size[0] as usize + x
+        self.row(y as f32) + self.column(x as f32)
     }
 
     /// The probe's image, with its parameterisation.

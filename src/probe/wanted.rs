@@ -10,10 +10,10 @@ use super::qhmap::ParameterMap;
 use crate::Result;
 use crate::progress::Progress;
 use crate::render::candidates::NearCandidates;
-use crate::render::gather::{GatherParams, WeightedProbe, best_samples, footprint_texels};
+use crate::render::gather::{GatherParams, WeightedProbe, best_samples, footprint_texels, tiles};
 use crate::render::gbuffer::gbuffer;
 use crate::render::glossy_probes::nearest_probes;
-use crate::render::mirror::mirror_hit;
+use crate::render::mirror::mirror_pass;
 use crate::scene::Camera;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
@@ -94,13 +94,15 @@ pub fn wanted_texels(
             .map(|&(index, weight)| WeightedProbe { index, probe: &probes[&index].0, candidates: candidates.of(index), weight })
             .collect();
         let fine = Camera { size: camera.size.map(|s| s * views.supersample), ..camera.clone() };
-        gbuffer(world, curvature, &fine).pixels.par_iter().flatten().filter(|p| p.alpha.is_some()).for_each(|pixel| {
-            let reflected = mirror_hit(world, &pixel.surface, pixel.wo);
-            let samples = best_samples(fine.position(), pixel, reflected, &weighted, &views.gather);
-            for (w, sample) in weighted.iter().zip(samples) {
-                let Some(sample) = sample else { continue };
-                for texel in footprint_texels(w.probe, sample.texel) {
-                    probes[&w.index].1[texel].store(true, Ordering::Relaxed);
+        let view = gbuffer(world, curvature, &fine);
+        let reflected = mirror_pass(world, &view);
+        tiles(&view, &reflected).par_iter().for_each(|tile| {
+            for samples in best_samples(&view, &reflected, tile, &weighted, &views.gather) {
+                for (w, sample) in weighted.iter().zip(samples) {
+                    let Some(sample) = sample else { continue };
+                    for texel in footprint_texels(w.probe, sample.texel) {
+                        probes[&w.index].1[texel].store(true, Ordering::Relaxed);
+                    }
                 }
             }
         });

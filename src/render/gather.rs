@@ -110,6 +110,9 @@ pub fn energy(view: &Reflection, probe: &Reflection, material_penalty: f32) -> f
     s_a * (s_b.min(1.0) + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0))
 }
 
+/// Side of a tile of pixels: what their searches read of a probe, some 100 KB, fits into a core's cache.
+const TILE: usize = 16;
+
 /// Least t_i: a probe at the far side of the cell still serves a pixel that no other serves.
 const MIN_TRILINEAR: f32 = 1e-6;
 
@@ -142,7 +145,7 @@ pub struct WeightedProbe<'a> {
 }
 
 /// Gathers all pixels of a view from `probes` (§5.2). `reflected` holds the view's mirror hits, one a pixel.
-/// `reduced` is the query at which the probes were baked.
+/// `roughness_scale` is what the probes were baked at.
 pub fn gather(
     world: &World,
     view: &GBuffer,
@@ -151,18 +154,35 @@ pub fn gather(
     roughness_scale: f32,
     params: &GatherParams,
 ) -> Vec<Gathered> {
-    let width = view.size()[0];
-    view.pixels
+    let tiles = tiles(view, reflected);
+    let gathered: Vec<Vec<Gathered>> = tiles
         .par_iter()
-        .zip(reflected)
-        .with_min_len(width)
-        .map(|(pixel, &reflected)| match pixel {
-            Some(p) if p.alpha.is_some() && reflected.material != NOTHING => {
-                gather_pixel(world, view, p, reflected, probes, roughness_scale, params)
-            }
-            _ => Gathered::NONE,
+        .map(|tile| {
+            let samples = best_samples(view, reflected, tile, probes, params);
+            let blended = tile.iter().zip(&samples).map(|(&i, samples)| match &view.pixels[i] {
+                Some(pixel) => blend(world, pixel, samples, probes, roughness_scale, params),
+                None => Gathered::NONE,
+            });
+            blended.collect()
         })
-        .collect()
+        .collect();
+    let mut image = vec![Gathered::NONE; view.pixels.len()];
+    for (&i, g) in tiles.iter().flatten().zip(gathered.iter().flatten()) {
+        image[i] = *g;
+    }
+    image
+}
+
+/// The glossy pixels of a view that reflect something, square by square: neighbours search the same texels of a probe, which then
+/// stay in the cache.
+pub fn tiles(view: &GBuffer, reflected: &[Reflected]) -> Vec<Vec<usize>> {
+    let [width, height] = view.size();
+    let glossy = |&i: &usize| view.pixels[i].as_ref().is_some_and(|p| p.alpha.is_some()) && reflected[i].material != NOTHING;
+    let tile = |x: usize, y: usize| {
+        let rows = y..(y + TILE).min(height);
+        rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x)).filter(glossy).collect()
+    };
+    (0..height).step_by(TILE).flat_map(|y| (0..width).step_by(TILE).map(move |x| tile(x, y))).collect()
 }
 
 /// What one probe offers a pixel.
@@ -174,40 +194,48 @@ pub struct Sample {
     pub texel: Vec2,
 }
 
-/// The sample of least energy of each of `probes` (at most eight), for a glossy pixel.
+/// The sample of least energy of each of `probes` (at most eight), for each of the glossy pixels `tile`.
 pub fn best_samples(
-    eye: Vec3,
-    pixel: &Pixel,
-    reflected: Reflected,
+    view: &GBuffer,
+    reflected: &[Reflected],
+    tile: &[usize],
     probes: &[WeightedProbe],
     params: &GatherParams,
-) -> [Option<Sample>; 8] {
-    let (r, n) = (pixel.surface.p, pixel.normal);
-    let at_view = Reflection { normal: n, direction: reflected.direction_from(r), reflected };
-    let path = Perturbation::new(eye, r, n, reflected.distance_from(r), &pixel.curvature, &params.perturb);
-    let mut samples = [None; 8];
-    for (sample, w) in samples.iter_mut().zip(probes) {
-        let x = path.reflection_point(w.probe.position);
-        *sample = search(w, x, pixel.surface.material, &at_view, params).map(|(energy, texel)| Sample { energy, texel });
+) -> Vec<[Option<Sample>; 8]> {
+    let eye = view.camera.position();
+    let pixels: Vec<_> = tile
+        .iter()
+        .filter_map(|&i| Some((view.pixels[i].as_ref()?, reflected[i])))
+        .map(|(pixel, reflected)| {
+            let (r, n) = (pixel.surface.p, pixel.normal);
+            let at_view = Reflection { normal: n, direction: reflected.direction_from(r), reflected };
+            let distance = reflected.distance_from(r);
+            (pixel.surface.material, at_view, Perturbation::new(eye, r, n, distance, &pixel.curvature, &params.perturb))
+        })
+        .collect();
+    let mut samples = vec![[None; 8]; tile.len()];
+    for (k, w) in probes.iter().enumerate() {
+        for (samples, (material, at_view, path)) in samples.iter_mut().zip(&pixels) {
+            samples[k] = search(w, path.reflection_point(w.probe.position), *material, at_view, params);
+        }
     }
     samples
 }
 
-fn gather_pixel(
+/// Eq. 2.
+fn blend(
     world: &World,
-    view: &GBuffer,
     pixel: &Pixel,
-    reflected: Reflected,
+    samples: &[Option<Sample>; 8],
     probes: &[WeightedProbe],
     roughness_scale: f32,
     params: &GatherParams,
 ) -> Gathered {
-    let samples = best_samples(view.camera.position(), pixel, reflected, probes, params);
-    let found = || probes.iter().zip(&samples).filter_map(|(w, s)| s.map(|s| (w, s)));
+    let found = || probes.iter().zip(samples).filter_map(|(w, s)| s.map(|s| (w, s)));
     let Some((nearest, best)) = found().min_by(|a, b| a.1.energy.total_cmp(&b.1.energy)) else {
         return Gathered::NONE;
     };
-    // Eq. 2, with exp(-φ E_min) cancelled against Z so that it cannot underflow.
+    // exp(-φ E_min) is cancelled against Z, so that it cannot underflow.
     let (mut sum, mut z) = (Rgb::ZERO, 0.0);
     for (w, sample) in found() {
         let weight = w.weight.max(MIN_TRILINEAR) * (-params.falloff * (sample.energy - best.energy)).exp();
@@ -229,39 +257,41 @@ pub fn footprint_texels(probe: &Probe, at: Vec2) -> [usize; 4] {
 
 /// The texel coordinate of least energy around the direction from the probe to `x`, coarse level first.
 /// Only texels whose reflector is of `material` count; `None` where there is none.
-fn search(w: &WeightedProbe, x: Vec3, material: u32, at_view: &Reflection, params: &GatherParams) -> Option<(f32, Vec2)> {
+fn search(w: &WeightedProbe, x: Vec3, material: u32, at_view: &Reflection, params: &GatherParams) -> Option<Sample> {
     let probe = w.probe;
     let direction = (x - probe.position).try_normalize()?;
     let mut centre = probe.map.texel_from_direction(direction);
-    let mut best: Option<(f32, Vec2)> = None;
+    let (mut least, mut found) = (f32::INFINITY, centre);
     for level in &params.search {
         let step = probe.map.search_scale(centre) * level.step;
         for j in -level.radius..=level.radius {
+            let y = centre.y + step.y * j as f32;
+            let row = probe.row(y);
             for i in -level.radius..=level.radius {
-                let at = centre + step * Vec2::new(i as f32, j as f32);
-                let candidate = &w.candidates[probe.index_at(at)];
-                let limit = best.map_or(f32::INFINITY, |b| b.0);
-                if candidate.material == material
-                    && let Some(e) = energy_below(limit, at_view, &candidate.reflection, params.material_penalty)
-                {
-                    best = Some((e, at));
+                let x = centre.x + step.x * i as f32;
+                let candidate = &w.candidates[row + probe.column(x)];
+                if candidate.material != material {
+                    continue;
+                }
+                // The reflected hit alone rules most texels out.
+                let (view, probe) = (at_view.reflected, candidate.reflection.reflected);
+                let s_a = if view.material == probe.material { 1.0 } else { params.material_penalty };
+                if s_a * reflected_distance(&view, &probe).min(1.0) >= least {
+                    continue;
+                }
+                let e = energy(at_view, &candidate.reflection, params.material_penalty);
+                if e < least {
+                    least = e;
+                    found = Vec2::new(x, y);
                 }
             }
         }
-        centre = best?.1;
+        if least == f32::INFINITY {
+            return None;
+        }
+        centre = found;
     }
-    best
-}
-
-/// [`energy`] where it is below `limit`.
-fn energy_below(limit: f32, view: &Reflection, probe: &Reflection, material_penalty: f32) -> Option<f32> {
-    // The reflected hit alone rules most texels out.
-    let s_a = if view.reflected.material == probe.reflected.material { 1.0 } else { material_penalty };
-    if s_a * reflected_distance(&view.reflected, &probe.reflected).min(1.0) >= limit {
-        return None;
-    }
-    let e = energy(view, probe, material_penalty);
-    (e < limit).then_some(e)
+    Some(Sample { energy: least, texel: found })
 }
 
 /// Colour at a fractional texel coordinate, bilinear over those of the four texels around it that `rule` lets in.

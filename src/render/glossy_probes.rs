@@ -6,7 +6,7 @@ use super::filter::{FilterInput, FilterParams, filter};
 use super::footprint::{Footprint, FootprintParams, GlossyPoint};
 use super::gather::{GatherParams, Gathered, WeightedProbe, gather};
 use super::gbuffer::{GBuffer, Pixel, gbuffer};
-use super::mirror::{Reflected, mirror_hit};
+use super::mirror::{Reflected, mirror_pass};
 use crate::Result;
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
@@ -183,17 +183,6 @@ pub fn nearest_probes(grid: &ProbeGrid, eye: Vec3, count: usize) -> Vec<(usize, 
     merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     merged.truncate(count.clamp(1, 8));
     merged
-}
-
-fn mirror_pass(world: &World, view: &GBuffer) -> Vec<Reflected> {
-    view.pixels
-        .par_iter()
-        .with_min_len(view.size()[0])
-        .map(|pixel| match pixel {
-            Some(p) if p.alpha.is_some() => mirror_hit(world, &p.surface, p.wo),
-            _ => Reflected::NONE,
-        })
-        .collect()
 }
 
 /// Σ_I of every pixel (Eq. 3): what the probes' reduced roughness lacks, pixels².

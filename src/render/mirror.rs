@@ -2,9 +2,11 @@
 //!
 //! The same function fills the probes' reflected map and the novel view's, so that equal geometry gives equal positions.
 
+use super::gbuffer::GBuffer;
 use crate::math::reflect;
 use crate::transport::{Surface, World};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Stands for the environment among material indices: the mirror ray left the scene.
 pub const SKY: u16 = u16::MAX - 1;
@@ -48,6 +50,18 @@ pub fn facing_normal(surface: &Surface, wo: Vec3) -> Vec3 {
     let ng = if surface.ng.dot(wo) < 0.0 { -surface.ng } else { surface.ng };
     let n = if surface.frame.n.dot(ng) < 0.0 { -surface.frame.n } else { surface.frame.n };
     if n.dot(wo) > 0.0 { n } else { ng }
+}
+
+/// The mirror hits of a view's glossy pixels; [`Reflected::NONE`] for the others.
+pub fn mirror_pass(world: &World, view: &GBuffer) -> Vec<Reflected> {
+    view.pixels
+        .par_iter()
+        .with_min_len(view.size()[0])
+        .map(|pixel| match pixel {
+            Some(p) if p.alpha.is_some() => mirror_hit(world, &p.surface, p.wo),
+            _ => Reflected::NONE,
+        })
+        .collect()
 }
 
 /// Traces the mirror ray of `surface` for a viewer at direction `wo`.
