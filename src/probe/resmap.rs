@@ -1,6 +1,9 @@
 //! The adaptive resolution map m = m_mat (m_size + m_complexity): how much resolution each direction deserves (§4.2.1, Fig. 4).
 //!
-//! *Reading*: "material smoothness" m_mat is 1 − α of the microfacet distribution, 1 for a mirror and 0 without a glossy lobe.
+//! *Reading*: "material smoothness" m_mat is 1 for a mirror and 0 without a glossy lobe; its most direct reading is 1 − α
+//! ([`Smoothness::Linear`]). *Ours*: a floor of α = 0.2 then gets four fifths of a mirror's texels, and a flat mirror shows fewer
+//! than plain lat-long would. The texels that a lobe deserves fall with its solid angle, so the default is
+//! 1 / (1 + (α / α½)²) ([`Smoothness::Lobe`]).
 //! *Reading*: θ_long in m_size is the latitude. The lat-long map gives a texel the solid angle cos(latitude) dθ dφ, so that
 //! m_size dθ dφ is a surface area, and sums to that of the room; with the longitude, as printed, it does not.
 //! *Reading*: both terms are divided by their means over the texels that see a surface; texels that see none have m = 0.
@@ -15,7 +18,30 @@ use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 use std::path::Path;
 
-/// Parameters of the resolution map; `Default` is the paper's.
+/// What m_mat makes of roughness.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Smoothness {
+    /// 1 − α.
+    Linear,
+    /// 1 / (1 + (α / α½)²).
+    Lobe {
+        /// The roughness that deserves half of a mirror's texels.
+        alpha_half: f32,
+    },
+}
+
+impl Smoothness {
+    /// m_mat of a surface, 0 to 1; 0 where it has no glossy lobe.
+    pub fn material_term(self, alpha: Option<f32>) -> f32 {
+        alpha.map_or(0.0, |alpha| match self {
+            Self::Linear => (1.0 - alpha).clamp(0.0, 1.0),
+            Self::Lobe { alpha_half } => 1.0 / (1.0 + (alpha / alpha_half).powi(2)),
+        })
+    }
+}
+
+/// Parameters of the resolution map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ResmapParams {
@@ -30,15 +56,23 @@ pub struct ResmapParams {
     /// Smallest facing cosine that m_size divides by. *Ours*: lower lets silhouettes starve the rest of the probe,
     /// higher leaves grazing floors without texels.
     pub facing_min: f32,
+    /// m_mat. §4.2.1 names it only.
+    pub smoothness: Smoothness,
 }
 
 impl Default for ResmapParams {
     fn default() -> Self {
-        Self { size: [256, 128], dct_size: 16, frequency_exponent: 5.0, blur_sigma: 5.0, facing_min: 0.05 }
+        Self { smoothness: Smoothness::Lobe { alpha_half: 0.05 }, ..Self::paper() }
     }
 }
 
 impl ResmapParams {
+    /// The paper's text.
+    pub fn paper() -> Self {
+        let smoothness = Smoothness::Linear;
+        Self { size: [256, 128], dct_size: 16, frequency_exponent: 5.0, blur_sigma: 5.0, facing_min: 0.05, smoothness }
+    }
+
     /// Refuses what [`resolution_map`] cannot work with.
     pub fn validate(&self) -> Result<()> {
         let [w, h] = self.size;
@@ -61,6 +95,11 @@ impl ResmapParams {
         if !(1e-4..=1.0).contains(&self.facing_min) {
             return bad(format!("smallest facing cosine {}: expected 0.0001 to 1", self.facing_min));
         }
+        if let Smoothness::Lobe { alpha_half } = self.smoothness
+            && !(1e-3..=100.0).contains(&alpha_half)
+        {
+            return bad(format!("alpha of half resolution {alpha_half}: expected 0.001 to 100"));
+        }
         Ok(())
     }
 }
@@ -80,11 +119,6 @@ pub struct ResolutionMap {
     pub m_complexity: Vec<f32>,
 }
 
-/// m_mat of a surface: 1 − α, or 0 where it has no glossy lobe.
-pub fn material_term(alpha: Option<f32>) -> f32 {
-    alpha.map_or(0.0, |a| (1.0 - a).clamp(0.0, 1.0))
-}
-
 /// m_size of one texel, before normalisation: m² per radian² of the lat-long map. `depth` in metres, `facing` the cosine of
 /// incidence, `latitude` from −π/2 to π/2.
 pub fn size_term(depth: f32, facing: f32, latitude: f32, facing_min: f32) -> f32 {
@@ -98,7 +132,7 @@ pub fn resolution_map(params: &ResmapParams, seen: &SeenBuffers) -> ResolutionMa
     let of = |f: &dyn Fn(usize, &Seen) -> f32| -> Vec<f32> {
         texels.iter().enumerate().map(|(i, t)| t.as_ref().map_or(0.0, |t| f(i, t))).collect()
     };
-    let m_mat = of(&|_, t| material_term(t.alpha));
+    let m_mat = of(&|_, t| params.smoothness.material_term(t.alpha));
     let latitude = |i: usize| PI * (0.5 - ((i / w as usize) as f32 + 0.5) / h as f32);
     let mut m_size = of(&|i, t| size_term(t.depth, t.facing, latitude(i), params.facing_min));
     let normal = [0, 1, 2].map(|axis| of(&|_, t| t.normal[axis]));

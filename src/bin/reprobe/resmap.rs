@@ -5,7 +5,7 @@ use crate::probe_set;
 use reprobe::io::Provenance;
 use reprobe::io::provenance::hash_file;
 use reprobe::probe::placement::ProbeGrid;
-use reprobe::probe::resmap::{ResmapParams, resolution_map};
+use reprobe::probe::resmap::{ResmapParams, Smoothness, resolution_map};
 use reprobe::probe::seen::SeenBuffers;
 use reprobe::probe::set::{ProbeSet, numbered};
 use serde_json::json;
@@ -46,6 +46,12 @@ pub struct Args {
     /// Smallest facing cosine that counts
     #[arg(long, value_name = "COS", default_value_t = ResmapParams::default().facing_min)]
     facing_min: f32,
+    /// Roughness alpha that deserves half of a mirror's texels
+    #[arg(long, value_name = "ALPHA", default_value_t = 0.05)]
+    alpha_half: f32,
+    /// The paper's text in every choice
+    #[arg(long, conflicts_with = "alpha_half")]
+    paper: bool,
 }
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
@@ -55,6 +61,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         frequency_exponent: args.frequency_exponent,
         blur_sigma: args.blur_sigma,
         facing_min: args.facing_min,
+        smoothness: if args.paper { Smoothness::Linear } else { Smoothness::Lobe { alpha_half: args.alpha_half } },
     };
     params.validate()?;
     let grid = ProbeGrid::read(&args.probes)?;

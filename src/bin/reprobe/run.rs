@@ -233,7 +233,10 @@ fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage
     }
     let mut list = vec![
         place.optional("--path", path.as_ref()).option("--output", out("probes.json").display()),
-        stage("resmap").option("--probes", out("probes.json").display()).option("--output", out("resmap").display()),
+        stage("resmap")
+            .flag("--paper", args.paper)
+            .option("--probes", out("probes.json").display())
+            .option("--output", out("resmap").display()),
         Stage::new("qhmap")
             .path(&out("resmap"))
             .option("--size", size_text(args.probe_size.unwrap_or(preset.probe_size)))
