@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 use reprobe::io::Provenance;
-use reprobe::probe::bake::{BakeParams, bake_glossy, probe_geometry};
+use reprobe::probe::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
 use reprobe::probe::file::Probe;
 use reprobe::probe::qhmap::ParameterMap;
 use reprobe::progress::Silent;
@@ -62,7 +62,8 @@ impl Setup {
             .map(|i| {
                 let corner = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) - 0.5;
                 let mut probe = probe_geometry(&world, centre + corner * spacing, ParameterMap::identity([width, width / 2]));
-                bake_glossy(&world, &mut probe, i, 0, &params, &|_| true, &Silent);
+                let bake = Bake { world: &world, params: &params, seed: 0, lightmap: None };
+                bake_glossy(&bake, &mut probe, i, &|_| true, &Silent);
                 probe
             })
             .collect();

@@ -11,8 +11,8 @@ use reprobe::transport::bsdf::{
     Bsdf, Conductor, Diffuse, Distribution, Lobes, PlasticParams, Query, RoughConductor, RoughPlastic,
 };
 use reprobe::transport::lights::Lights;
-use reprobe::transport::path::{PathParams, radiance, scattered, trace_layers, transmitted_irradiance};
-use reprobe::transport::{Ray, Sampler, World};
+use reprobe::transport::path::{PathParams, radiance, scattered, scattered_onto_known, trace_layers, transmitted_irradiance};
+use reprobe::transport::{Ray, Sampler, Surface, World};
 use room::Room;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
@@ -99,6 +99,28 @@ fn a_furnace_glows_with_the_geometric_series() {
     estimate(8192, 2, |s| trace_layers(&world, &ray, &params, s).diffuse).assert_is(total * 0.6, 0.01);
     let exact = trace_layers(&world, &ray, &params, &mut Sampler::new(1, 1));
     assert_eq!((exact.emission, exact.glossy), (Rgb::new(1.0, 0.5, 2.0), Rgb::ZERO));
+}
+
+/// Perfect mirrors leave a furnace's light as it is.
+#[test]
+fn known_diffuse_light_stands_in_for_the_paths_that_would_find_it() {
+    let glow = Rgb::new(1.0, 0.5, 2.0);
+    let mut room = Room::default();
+    let walls = room.inward_box(Vec3::splat(-1.0), Vec3::splat(1.0), diffuse(0.6));
+    room.emit(walls, glow);
+    let silver = Conductor { eta: Rgb::ZERO, k: Rgb::ONE, specular_reflectance: Texture::Constant(Rgb::ONE) };
+    let mirror = || room::two_sided(Bsdf::Conductor(silver.clone()));
+    room.rectangle(Vec3::new(0.0, -0.5, 0.0), Vec3::X * 0.5, Vec3::Z * -0.5, mirror());
+    room.rectangle(Vec3::new(0.0, 0.5, 0.0), Vec3::X * 0.5, Vec3::Z * 0.5, mirror());
+    let world = room.world();
+    // Down, up and down again between the mirrors, then out to a wall.
+    let ray = Ray::new(Vec3::new(-0.45, 0.4, 0.0), Vec3::new(0.25, -1.0, 0.0).normalize());
+    let surface = world.intersect(&ray).unwrap();
+    let known = |s: &Surface, _: Vec3| if s.object == walls { glow * 0.6 / (1.0 - 0.6) } else { Rgb::ZERO };
+    let query = Query { lobes: Lobes::NON_DIFFUSE, ..Query::default() };
+    let found = scattered_onto_known(&world, &surface, -ray.d, query, &known, &mut Sampler::new(1, 1));
+    assert!((found - glow / (1.0 - 0.6)).abs().max_element() < 1e-5, "{found}");
+    estimate(8192, 21, |s| scattered(&world, &surface, -ray.d, query, &PathParams::default(), s)).assert_is(found, 0.01);
 }
 
 #[test]

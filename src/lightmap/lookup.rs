@@ -13,8 +13,10 @@ use super::adjacency::NONE;
 use crate::io::{ExrImage, Provenance};
 use crate::math::Rgb;
 use crate::scene::{Geometry, Scene};
+use crate::transport::Surface;
 use crate::{Error, Result};
-use glam::{Vec2, Vec4};
+use glam::{Vec2, Vec3, Vec4};
+use std::f32::consts::FRAC_1_PI;
 use std::path::Path;
 
 /// First word of the table; changes with its layout.
@@ -60,6 +62,16 @@ impl LightMap {
         let Some([a, b, c]) = self.corners.get(triangle as usize) else { return Rgb::ZERO };
         let p = *a + (*b - *a) * barycentric.x + (*c - *a) * barycentric.y;
         bilinear(p, self.size).map_or(Rgb::ZERO, |taps| taps.iter().map(|&(i, w)| pixels[i] * w).sum())
+    }
+
+    /// L(S|D)*DE: what the diffuse lobe at `surface` sends towards `wo` (unit, world, away from it).
+    pub fn diffuse_radiance(&self, scene: &Scene, surface: &Surface, wo: Vec3) -> Rgb {
+        let wi = surface.frame.to_local(wo);
+        let out = scene.materials[surface.material as usize].bsdf.diffuse_out(surface, wi);
+        if out == Rgb::ZERO {
+            return Rgb::ZERO;
+        }
+        out * self.lookup(surface.triangle, surface.barycentric, wi.z < 0.0) * FRAC_1_PI
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::file::{Probe, Texel};
 use super::qhmap::ParameterMap;
+use crate::lightmap::LightMap;
 use crate::math::{Rgb, hash_words};
 use crate::progress::Progress;
 use crate::render::mirror::mirror_hit;
 use crate::transport::bsdf::{Lobes, Query};
-use crate::transport::path::{PathParams, scattered};
+use crate::transport::path::{PathParams, scattered, scattered_onto_known};
 use crate::transport::{Ray, Sampler, Surface, World};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -61,14 +62,25 @@ pub fn is_glossy(world: &World, surface: &Surface, wo: Vec3) -> bool {
     bsdf.lobes().contains(Lobes::NON_DIFFUSE) && (bsdf.is_two_sided() || surface.frame.n.dot(wo) > 0.0)
 }
 
+/// What all probes of a bake share.
+#[derive(Clone, Copy)]
+pub struct Bake<'a> {
+    /// The scene.
+    pub world: &'a World,
+    /// Parameters.
+    pub params: &'a BakeParams,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Diffuse light of the scene, read where a path leaves the glossy chain. *Ours*: the paper traces on.
+    pub lightmap: Option<&'a LightMap>,
+}
+
 /// Fills the glossy map: L(S|D)*S+E with the first vertex' roughness reduced. Texels for which `wanted` does not hold stay black.
 /// Returns how many texels had paths traced. The random stream of a texel is a hash of (seed, probe index, texel), so that no thread count changes a bit.
 pub fn bake_glossy(
-    world: &World,
+    bake: &Bake,
     probe: &mut Probe,
     index: u32,
-    seed: u32,
-    params: &BakeParams,
     wanted: &(dyn Fn(u32) -> bool + Sync),
     progress: &dyn Progress,
 ) -> u64 {
@@ -79,8 +91,8 @@ pub fn bake_glossy(
         for (x, texel) in row.iter_mut().enumerate() {
             let i = y as u32 * width + x as u32;
             if texel.triangle != super::file::NO_TRIANGLE && wanted(i) {
-                let stream = hash_words(&[seed, index, i]);
-                if let Some(glossy) = glossy_texel(world, position, map, i, stream, params) {
+                let stream = hash_words(&[bake.seed, index, i]);
+                if let Some(glossy) = glossy_texel(bake, position, map, i, stream) {
                     texel.set_glossy(glossy);
                     traced += 1;
                 }
@@ -93,10 +105,12 @@ pub fn bake_glossy(
 }
 
 /// Mean of the paths of one texel; `None` where its centre sees no glossy surface.
-fn glossy_texel(world: &World, position: Vec3, map: &ParameterMap, texel: u32, stream: u32, params: &BakeParams) -> Option<Rgb> {
+fn glossy_texel(bake: &Bake, position: Vec3, map: &ParameterMap, texel: u32, stream: u32) -> Option<Rgb> {
+    let Bake { world, params, .. } = *bake;
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: params.roughness_scale };
     let to_centre = direction(map, texel, Vec2::splat(0.5));
     let centre = world.intersect(&Ray::new(position, to_centre)).filter(|s| is_glossy(world, s, -to_centre))?;
+    let known = bake.lightmap.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&world.scene, s, wo));
     let mut sum = Rgb::ZERO;
     for sample in 0..params.spp {
         let mut sampler = Sampler::new(stream, sample);
@@ -109,7 +123,10 @@ fn glossy_texel(world: &World, position: Vec3, map: &ParameterMap, texel: u32, s
                 (surface, wo) = (s, -d);
             }
         }
-        sum += scattered(world, &surface, wo, query, &PathParams::default(), &mut sampler);
+        sum += match &known {
+            Some(known) => scattered_onto_known(world, &surface, wo, query, known, &mut sampler),
+            None => scattered(world, &surface, wo, query, &PathParams::default(), &mut sampler),
+        };
     }
     Some(sum / params.spp as f32)
 }

@@ -1,12 +1,11 @@
 //! The last passes: filling what no probe served, averaging sub-pixels, adding the layers.
 
 use super::gather::Gathered;
-use super::gbuffer::GBuffer;
+use super::gbuffer::{GBuffer, Pixel};
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::scene::{Camera, Scene};
 use rayon::prelude::*;
-use std::f32::consts::PI;
 
 /// The last frame's view and glossy layer.
 pub struct Previous {
@@ -49,17 +48,8 @@ fn lookup_previous(previous: &Previous, camera: &Camera, p: glam::Vec3, material
 
 /// The diffuse layer: the light map's E times the view's factor of the diffuse lobe, `diffuse_out(ω) E / π`.
 pub fn diffuse_layer(scene: &Scene, view: &GBuffer, lightmap: &LightMap) -> Vec<Rgb> {
-    view.pixels
-        .par_iter()
-        .map(|pixel| {
-            let Some(p) = pixel else { return Rgb::ZERO };
-            let s = &p.surface;
-            let bsdf = &scene.materials[s.material as usize].bsdf;
-            let wi = s.frame.to_local(p.wo);
-            let out = bsdf.diffuse_out(s, wi);
-            if out == Rgb::ZERO { Rgb::ZERO } else { out * lightmap.lookup(s.triangle, s.barycentric, wi.z < 0.0) / PI }
-        })
-        .collect()
+    let radiance = |p: &Pixel| lightmap.diffuse_radiance(scene, &p.surface, p.wo);
+    view.pixels.par_iter().map(|pixel| pixel.as_ref().map_or(Rgb::ZERO, radiance)).collect()
 }
 
 /// Mean over the n x n sub-pixels of each pixel. `size` is that of `fine`.

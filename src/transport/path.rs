@@ -51,6 +51,10 @@ impl Layers {
     }
 }
 
+/// Diffuse radiance that leaves a surface in a direction (unit, world, away from it), known from elsewhere: a light map.
+/// Paths that are given one read it at every vertex but their first, and go on by the non-diffuse lobes alone.
+pub type KnownDiffuse<'a> = &'a (dyn Fn(&Surface, Vec3) -> Rgb + Sync);
+
 /// One sample of the three layers along a camera ray.
 pub fn trace_layers(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Layers {
     let Some(surface) = world.intersect(ray) else {
@@ -84,20 +88,34 @@ pub fn scattered(
     sampler: &mut Sampler,
 ) -> Rgb {
     let measure = Measure::Scattering { wi: surface.frame.to_local(wo_world), query };
-    integrate(&Vertex { world, surface, measure }, params, sampler)
+    integrate(&Vertex { world, surface, measure }, None, params, sampler)
+}
+
+/// [`scattered`], with the diffuse radiance of all later vertices read from `known`: less noise, far shorter paths, and the
+/// bias of what is known.
+pub fn scattered_onto_known(
+    world: &World,
+    surface: &Surface,
+    wo_world: Vec3,
+    query: Query,
+    known: KnownDiffuse,
+    sampler: &mut Sampler,
+) -> Rgb {
+    let measure = Measure::Scattering { wi: surface.frame.to_local(wo_world), query };
+    integrate(&Vertex { world, surface, measure }, Some(known), &PathParams::default(), sampler)
 }
 
 /// Incident, not scattered light: one sample of the light map's quantity ∫ T_in(ω) L(ω) cos θ dω at `surface`, on the side of
 /// `frame.n` (or its back with `back`), with T_in = [`super::bsdf::Bsdf::diffuse_in`]. L holds all paths, direct light included.
 pub fn transmitted_irradiance(world: &World, surface: &Surface, back: bool, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     let measure = Measure::Irradiance { side: if back { -1.0 } else { 1.0 } };
-    integrate(&Vertex { world, surface, measure }, params, sampler)
+    integrate(&Vertex { world, surface, measure }, None, params, sampler)
 }
 
 /// Radiance arriving from the far end of `ray`, emission included, without a split.
 pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     let start = Start { ray: *ray, pdf: 1.0, delta: true, eta: 1.0, depth: 0 };
-    keep_finite(incident(world, start, params, sampler))
+    keep_finite(incident(world, start, None, params, sampler))
 }
 
 /// Samples that were not finite and counted as zero, since the program started (debug builds only).
@@ -148,7 +166,7 @@ struct Start {
 }
 
 /// One sample of the integral of incident radiance at the first vertex of a path.
-fn integrate(vertex: &Vertex, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     if params.max_depth == 0 {
         return Rgb::ZERO;
     }
@@ -158,13 +176,13 @@ fn integrate(vertex: &Vertex, params: &PathParams, sampler: &mut Sampler) -> Rgb
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
         let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
         let start = Start { ray, pdf: sample.pdf, delta: sample.delta, eta: sample.eta, depth: 1 };
-        sum += sample.weight * incident(vertex.world, start, params, sampler);
+        sum += sample.weight * incident(vertex.world, start, known, params, sampler);
     }
     keep_finite(sum)
 }
 
 /// Radiance along a ray: emission weighted against the emitter sampling at its origin, and all that is scattered on.
-fn incident(world: &World, start: Start, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     let Start { mut ray, mut pdf, mut delta, mut eta, mut depth } = start;
     let mut sum = Rgb::ZERO;
     let mut throughput = Rgb::ONE;
@@ -186,9 +204,17 @@ fn incident(world: &World, start: Start, params: &PathParams, sampler: &mut Samp
         if depth >= params.max_depth {
             return sum;
         }
+        let mut query = Query::default();
+        if let Some(known) = known {
+            sum += throughput * known(&surface, wo);
+            query.lobes = Lobes::NON_DIFFUSE;
+            if !world.scene.materials[surface.material as usize].bsdf.lobes().intersects(query.lobes) {
+                return sum;
+            }
+        }
         let [light_x, light_y, light_choice, live] = sampler.next_4d();
         let [x, y, lobe, _] = sampler.next_4d();
-        let measure = Measure::Scattering { wi: surface.frame.to_local(wo), query: Query::default() };
+        let measure = Measure::Scattering { wi: surface.frame.to_local(wo), query };
         let vertex = Vertex { world, surface: &surface, measure };
         sum += throughput * vertex.direct(light_choice, Vec2::new(light_x, light_y));
         let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) else { return sum };

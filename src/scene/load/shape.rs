@@ -39,7 +39,8 @@ impl<'a> Builder<'a> {
         };
         params.finish(&mut self.scene.warnings);
         let g = &mut self.scene.geometry;
-        let most = u32::MAX as usize;
+        // A bit of a triangle's index is the tree's.
+        let most = u32::MAX as usize / 2;
         if g.positions.len() + mesh.positions.len() > most || g.triangles.len() + mesh.triangles.len() > most {
             return Err(node.at.error(format!("the scene has more than {most} vertices or triangles")));
         }
