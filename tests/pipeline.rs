@@ -124,7 +124,7 @@ fn run_again_does_only_what_is_missing() {
     let f = Folder::new();
     f.figures(RUN);
     let before = contents(&f.at("out"));
-    let bake = |figures: &Value| figures["stages"][4]["figures"].clone();
+    let bake = |figures: &Value| figures["stages"][5]["figures"].clone();
     assert_eq!(bake(&f.figures(RUN))["baked"], 0);
     // A bake that was killed has some probes, and no set.json.
     std::fs::remove_file(f.at("out/probes/set.json")).unwrap();

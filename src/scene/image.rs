@@ -49,6 +49,7 @@ impl Image {
     }
 
     /// The pixel in column `x` and row `y`.
+    #[inline]
     pub fn pixel(&self, x: usize, y: usize) -> Rgb {
         let i = y * self.width + x;
         match &self.pixels {

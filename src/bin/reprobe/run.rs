@@ -222,6 +222,9 @@ fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage
         .option("--qhmap", out("qhmap").display())
         .option("--output", out("probes").display())
         .option("--spp", args.spp.unwrap_or(preset.spp));
+    if !args.paper {
+        bake = bake.option("--lightmap", out("lightmap.exr").display());
+    }
     if !all_texels {
         bake = bake
             .optional("--for-path", path.as_ref())
@@ -244,12 +247,12 @@ fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage
             .optional("--threads", common.threads)
             .flag("--quiet", common.quiet),
         stage("curvature").option("--output", out("curvature.exr").display()),
-        bake,
         stage("bake-lightmap")
             .option("--spp", args.lightmap_spp.unwrap_or(preset.lightmap_spp))
             .optional("--texels", args.texel.is_none().then_some(preset.lightmap_texels))
             .optional("--texel", args.texel)
             .option("--output", out("lightmap.exr").display()),
+        bake,
         view(stage("render-path"))
             .option("--probes", out("probes").display())
             .option("--lightmap", out("lightmap.exr").display())
