@@ -2,7 +2,8 @@
 
 The stock `path` integrator takes over from the second vertex on. Import this after the variant is set. The first vertex is
 the first one that scatters: surfaces with an unscattered component (alpha masks) are looped over, at random. A pane of
-`thindielectric` is an interface, not a hole: its straight transmission belongs to the non-diffuse layer.
+`thindielectric` is an interface, not a hole: its straight transmission belongs to the non-diffuse layer. (A mask over a perfect
+mirror looks the same to Mitsuba's flags, and is taken for a pane.)
 """
 
 import drjit as dr
@@ -31,6 +32,16 @@ def power_heuristic(a, b):
     a, b = a * a, b * b
     weight = a / (a + b)
     return dr.select(dr.isfinite(weight), weight, 0.0)  # as Mitsuba: both zero, or one past the range of a float
+
+
+PANE = int(mi.BSDFFlags.Null | mi.BSDFFlags.DeltaReflection)
+SIDES = int(mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide)
+
+
+def holes(bsdf, si, active):
+    """How much of the light goes through a mask's holes; 0 for a pane, which also has a null lobe."""
+    is_pane = (bsdf.flags() | SIDES) == (PANE | SIDES)
+    return dr.select(is_pane, 0.0, bsdf.eval_null_transmission(si, active & ~is_pane))
 
 
 class FirstVertex(mi.SamplingIntegrator):
@@ -72,7 +83,7 @@ class FirstVertex(mi.SamplingIntegrator):
             throughput[active] *= weight
             active &= dr.max(throughput) > 0.0
             is_null = active & mi.has_flag(sample.sampled_type, mi.BSDFFlags.Null)
-            passes = is_null & (dr.max(bsdf.eval_null_transmission(si, is_null)) > 0.0)
+            passes = is_null & (dr.max(holes(bsdf, si, is_null)) > 0.0)
             leaves = active & ~passes & (~is_null | panes_count)
             ray = si.spawn_ray(si.to_world(sample.wo))
             vertex.p = dr.select(leaves, si.p, vertex.p)
@@ -113,7 +124,7 @@ class Emission(mi.SamplingIntegrator):
             emitter = si.emitter(scene, active)
             radiance[active & (emitter != None)] += throughput * emitter.eval(si, active)  # noqa: E711
             active &= si.is_valid()
-            throughput[active] *= si.bsdf(ray).eval_null_transmission(si, active)
+            throughput[active] *= holes(si.bsdf(ray), si, active)
             active &= dr.max(throughput) > 0.0
             ray = si.spawn_ray(ray.d)
             steps += 1

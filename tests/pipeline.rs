@@ -224,7 +224,7 @@ fn a_dry_run_prints_the_commands_and_writes_nothing() {
     let f = Folder::new();
     let output = f.reprobe(&format!("{RUN} --dry-run"));
     let lines: Vec<String> = text(&output.stdout).lines().map(str::to_owned).collect();
-    let commands = ["place-probes", "resmap", "qhmap", "curvature", "bake-probes", "bake-lightmap", "render-path", "render-path"];
+    let commands = ["place-probes", "resmap", "qhmap", "curvature", "bake-lightmap", "bake-probes", "render-path", "render-path"];
     for (line, command) in lines.iter().zip(commands) {
         assert!(line.starts_with(&format!("reprobe {command} ")), "{line}");
     }

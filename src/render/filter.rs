@@ -5,8 +5,9 @@
 //! Reading: the confidence 1/E goes with the colour through the passes and is divided out at the end (normalised convolution, Knutsson and
 //! Westin 1993), so that it counts once; each pass is normalised by its own spatial and range weights.
 //! Ours, after measurements: E is not let below [`FilterParams::min_energy`], since one perfect sample must not outshine all others, and zero
-//! must not divide; the kernel may have the tails of GGX, (1 + q)⁻², instead of a Gaussian's; the depth threshold is wide, for 0.2 m cuts
-//! a floor's kernel at a visible line.
+//! must not divide; at 3, the most that a sample of the right reflected material reaches, 1/E only tells the wrong ones. The kernel may
+//! have the tails of GGX, (1 + q)⁻², instead of a Gaussian's. Normals must be closer, so that a bevel keeps its edge; the depth threshold
+//! is wide, for 0.2 m cuts a floor's kernel at a visible line.
 //!
 //! In: linear radiance and its guides a pixel, covariance in pixels². Out: linear radiance. Pixels without a glossy surface neither
 //! give nor take.
@@ -58,7 +59,7 @@ pub struct FilterParams {
     pub kernel: Kernel,
     /// Evaluation. Paper: four passes.
     pub method: Method,
-    /// Smallest cosine between two normals that may mix, α_n. Paper: 0.8.
+    /// Smallest cosine between two normals that may mix, α_n. Paper: 0.8; ours, 0.95.
     pub min_normal_cos: f32,
     /// Largest difference in depth that may mix, α_d, m. Paper: 0.2.
     pub depth_threshold: f32,
@@ -75,9 +76,9 @@ impl Default for FilterParams {
         Self {
             kernel: Kernel::Ggx,
             method: Method::FourPass,
-            min_normal_cos: 0.8,
+            min_normal_cos: 0.95,
             depth_threshold: 1.0,
-            min_energy: 0.1,
+            min_energy: 3.0,
             radius_sigmas: 3.0,
             max_radius: 128.0,
         }
@@ -87,7 +88,7 @@ impl Default for FilterParams {
 impl FilterParams {
     /// The paper's text.
     pub fn paper() -> Self {
-        Self { kernel: Kernel::Gaussian, depth_threshold: 0.2, min_energy: 1e-3, ..Self::default() }
+        Self { kernel: Kernel::Gaussian, min_normal_cos: 0.8, depth_threshold: 0.2, min_energy: 1e-3, ..Self::default() }
     }
 }
 
@@ -188,6 +189,9 @@ fn full(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
         let (major, minor) = (major.clamp(1e-3, limit), minor.clamp(1e-3, limit));
         let extent = |a: f32, b: f32| (reach * (a * a * major + b * b * minor).sqrt()).floor() as isize;
         let (rx, ry) = (extent(axis.x, axis.y), extent(axis.y, axis.x));
+        if (rx, ry) == (0, 0) {
+            return input.color[i];
+        }
         let (x, y) = (i as isize % w, i as isize / w);
         let (mut sum, mut total) = (Rgb::ZERO, 0.0);
         for yy in (y - ry).max(0)..=(y + ry).min(h - 1) {

@@ -1,6 +1,7 @@
 //! `reprobe bake-probes`.
 
 use crate::common::{Common, Outcome, Shard, parse_shard, parse_size};
+use crate::set_params::apply;
 use crate::views::{FrameList, parse_frames, views};
 use anyhow::{Context, bail};
 use reprobe::io::provenance::hash_file;
@@ -14,7 +15,7 @@ use reprobe::probe::set::{ProbeSet, numbered};
 use reprobe::probe::store::{ProbeStore, write_set};
 use reprobe::probe::wanted::{Views, Wanted, wanted_texels};
 use reprobe::progress::Progress;
-use reprobe::render::gather::GatherParams;
+use reprobe::render::glossy_probes::GlossyProbeParams;
 use reprobe::surface::curvature_file;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -76,6 +77,9 @@ pub struct Args {
     /// Choose texels as the paper does, for --for-path
     #[arg(long)]
     paper: bool,
+    /// Choose texels with this parameter of the gather, as render-path's --set, for --for-path
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    set: Vec<String>,
 }
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
@@ -100,7 +104,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
 
     let params = BakeParams { spp: args.spp, roughness_scale: args.roughness_scale, spread: args.spread };
     let progress = common.progress();
-    let gather = if args.paper { GatherParams::paper() } else { GatherParams::default() };
+    let gather = apply(&if args.paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() }, &args.set)?.gather;
     let for_path = match &args.for_path {
         Some(path) => {
             let views = views(common, scene, Some(path), args.size, args.frames.as_ref())?;

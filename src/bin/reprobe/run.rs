@@ -70,6 +70,9 @@ pub struct Args {
     /// The paper's text in every choice
     #[arg(long)]
     paper: bool,
+    /// Set a parameter of a pass, as render-path's --set
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    set: Vec<String>,
     /// Print the stages' commands and stop
     #[arg(long)]
     dry_run: bool,
@@ -212,6 +215,7 @@ fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage
         s = s.optional("--unit-scale", (common.unit_scale != 1.0).then_some(common.unit_scale));
         common.defines.iter().fold(s, |s, d| s.option("--define", d))
     };
+    let set = |s: Stage| args.set.iter().fold(s, |s, set| s.option("--set", set));
     let view = |s: Stage| {
         s.optional("--path", path.as_ref()).optional("--size", size.as_ref()).optional("--frames", args.frames.as_ref())
     };
@@ -226,7 +230,7 @@ fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage
         bake = bake.option("--lightmap", out("lightmap.exr").display());
     }
     if !all_texels {
-        bake = bake
+        bake = set(bake)
             .optional("--for-path", path.as_ref())
             .option("--curvature", out("curvature.exr").display())
             .optional("--size", size.as_ref())
@@ -253,7 +257,7 @@ fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage
             .optional("--texel", args.texel)
             .option("--output", out("lightmap.exr").display()),
         bake,
-        view(stage("render-path"))
+        set(view(stage("render-path")))
             .option("--probes", out("probes").display())
             .option("--lightmap", out("lightmap.exr").display())
             .option("--curvature", out("curvature.exr").display())

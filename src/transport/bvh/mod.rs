@@ -3,8 +3,9 @@
 //! The answer does not depend on the tree: of two triangles at exactly the same distance, the one with the lower index wins.
 //! Triangles without area or with coordinates that are not finite are never hit.
 //!
-//! Ours: a ray passes a triangle whose material has an opacity where a hash of ray and triangle, uniform in [0, 1), is not
-//! below that opacity. Repeating a ray repeats its answer, and the mean over many rays is the opacity.
+//! Ours: a ray passes a surface whose material has an opacity where a hash of ray and surface, uniform in [0, 1), is not
+//! below that opacity. Repeating a ray repeats its answer, and the mean over many rays is the opacity. The two faces of a thin
+//! sheet (a blind, a leaf) count once, as in Mitsuba, which steps over the second: see [`SHEET`].
 
 mod simd;
 #[cfg(test)]
@@ -31,6 +32,10 @@ use wide::Tree;
 /// Boxes are larger than their triangles by this much of the scene's largest coordinate: more than what rounding can move a
 /// hit, so that the tree finds whatever testing every triangle would.
 const BOX_MARGIN: f32 = 8.0 * f32::EPSILON;
+
+/// Hits of one object in one interval of this length along a ray share their hash, times (1 + largest coordinate of its origin).
+/// Sixteen times Mitsuba's step off a surface, so that few sheets thinner than that step straddle two intervals.
+const SHEET: f32 = 16.0 * 1500.0 * 0.5 * f32::EPSILON;
 
 /// Acceleration structure over the triangles of a scene (all, or the opaque ones only).
 pub struct Bvh {
@@ -123,10 +128,13 @@ fn any_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> boo
 
 /// Whether `ray` goes through a triangle of partly opaque material.
 fn passes(scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
-    let object = scene.geometry.object(hit.triangle);
+    let object_index = scene.geometry.triangle_object[hit.triangle as usize];
+    let object = &scene.geometry.objects[object_index as usize];
     let Some(opacity) = &scene.materials[object.material as usize].opacity else { return false };
     let words = [ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z].map(f32::to_bits);
-    let hash = hash_words(&[words[0], words[1], words[2], words[3], words[4], words[5], hit.triangle]);
-    let uniform = (hash >> 8) as f32 * (1.0 / 16_777_216.0);
-    uniform >= luminance(opacity.eval(uv_at(&scene.geometry, hit)))
+    let of_ray = hash_words(&words);
+    let uniform = |hash: u32| (hash >> 8) as f32 * (1.0 / 16_777_216.0);
+    // Where a ray's intervals begin is its own.
+    let interval = (hit.t / (SHEET * (1.0 + ray.o.abs().max_element())) + uniform(of_ray)).floor();
+    uniform(hash_words(&[of_ray, object_index, interval.to_bits()])) >= luminance(opacity.eval(uv_at(&scene.geometry, hit)))
 }

@@ -196,6 +196,40 @@ fn masks_let_through_what_their_opacity_says() {
     }
 }
 
+/// Kitchen's blinds are boxes a tenth of a millimetre thick.
+#[test]
+fn a_thin_sheet_counts_once_and_two_sheets_twice() {
+    let opacity = 0.6f32;
+    for (gap, expected) in [(1e-4, opacity), (0.3, 1.0 - (1.0 - opacity).powi(2))] {
+        let mut sheets = primitives::rectangle();
+        let behind = primitives::rectangle();
+        sheets.triangles.extend(behind.triangles.iter().map(|t| t.map(|i| i + 4)));
+        sheets.positions.extend(behind.positions.iter().map(|p| *p - Vec3::Z * gap));
+        sheets.normals.extend(behind.normals);
+        sheets.uvs.extend(behind.uvs);
+        let mut scene = scene_of(sheets, Mat4::IDENTITY);
+        scene.materials = vec![Material {
+            name: String::new(),
+            bsdf: Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::ONE) }),
+            opacity: Some(Texture::Constant(Rgb::splat(opacity))),
+        }];
+        let bvh = Bvh::build(&scene, &|_| true);
+        let mut random = Random(4);
+        let count = 20_000;
+        let stopped = (0..count)
+            .filter(|_| {
+                let d = (random.point() * Vec3::new(0.2, 0.2, 0.0) + Vec3::NEG_Z).normalize();
+                bvh.occluded(&scene, &Ray::new(Vec3::new(random.next() * 0.5, random.next() * 0.5, 1.0), d))
+            })
+            .count();
+        let mean = stopped as f32 / count as f32;
+        let sigma = (expected * (1.0 - expected) / count as f32).sqrt();
+        // One sheet in thirty straddles two intervals, and then stops a quarter more of what is left.
+        let straddling = 0.04 * opacity * (1.0 - opacity);
+        assert!((mean - expected).abs() <= 4.0 * sigma + straddling, "{gap} m: {mean} of {expected}, sigma {sigma}");
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 #[test]
 fn avx2_and_portable_answer_bit_for_bit() {
