@@ -4,6 +4,7 @@
 //! is the zenith and the last the nadir. Between pixels radiance is bilinear, and so is the density per lat-long area, whose
 //! corner values are luminance times sine at the pixels.
 
+use super::steps::Steps;
 use crate::math::{Rgb, direction_from_lat_long, lat_long_from_direction, luminance};
 use crate::scene::image::Image;
 use glam::{Affine3A, Mat3, Vec2, Vec3};
@@ -17,10 +18,12 @@ pub struct Envmap {
     scale: f32,
     world_from_local: Mat3,
     local_from_world: Mat3,
-    /// Running sum over rows of cells, normalised; one entry more than there are rows of cells.
-    rows: Vec<f32>,
-    /// The same along each row of cells, one row after the other.
-    columns: Vec<f32>,
+    /// Distribution over rows of cells.
+    rows: Steps,
+    /// Distribution along each row of cells.
+    columns: Vec<Steps>,
+    /// Sine of the polar angle of each row of pixels. (An image of one or two rows is nothing but poles: 1 there.)
+    sines: Vec<f32>,
     /// Mean corner value over all cells: what turns a corner value into a density.
     mean: f32,
 }
@@ -44,8 +47,11 @@ impl Envmap {
             scale,
             world_from_local,
             local_from_world: world_from_local.inverse(),
-            rows: Vec::new(),
+            rows: Steps::new([1.0]).0,
             columns: Vec::new(),
+            sines: (0..image.height)
+                .map(|y| if image.height < 3 { 1.0 } else { (PI * y as f32 / (image.height - 1) as f32).sin() })
+                .collect(),
             mean: 0.0,
         };
         let (width, height) = map.cells();
@@ -57,12 +63,12 @@ impl Envmap {
                 let x1 = (x + 1) % width;
                 0.25 * (corner(x, y) + corner(x1, y) + corner(x, y1) + corner(x1, y1))
             });
-            let (sums, total) = normalised_sums(cells);
-            map.columns.extend(sums);
+            let (steps, total) = Steps::new(cells);
+            map.columns.push(steps);
             rows.push(total);
         }
-        let (sums, total) = normalised_sums(rows);
-        map.rows = sums;
+        let (steps, total) = Steps::new(rows);
+        map.rows = steps;
         map.mean = (total / (width * height) as f64) as f32;
         (map.mean > 0.0 && map.mean.is_finite()).then_some(map)
     }
@@ -78,11 +84,11 @@ impl Envmap {
         self.density(&self.place(uv)) / lat_long_jacobian(uv.y)
     }
 
-    /// A direction and its pdf (solid angle).
-    pub fn sample(&self, v: Vec2) -> (Vec3, f32) {
+    /// A direction, its pdf (solid angle) and the radiance from there.
+    pub fn sample(&self, v: Vec2) -> (Vec3, f32, Rgb) {
         let (width, height) = self.cells();
-        let (y, vy) = pick(&self.rows, v.y);
-        let (x, vx) = pick(&self.columns[y * (width + 1)..(y + 1) * (width + 1)], v.x);
+        let (y, vy) = self.rows.pick(v.y);
+        let (x, vx) = self.columns[y].pick(v.x);
         let mut place = Place { x: [x, (x + 1) % width], y: [y, (y + 1).min(self.image.height - 1)], at: Vec2::ZERO };
         let [[a, b], [c, d]] = self.corners(&place);
         place.at.y = sample_linear(vy, a + b, c + d);
@@ -90,7 +96,7 @@ impl Envmap {
         place.at.x = sample_linear(vx, a + (c - a) * ty, b + (d - b) * ty);
         let uv = Vec2::new((x as f32 + place.at.x + 0.5) / width as f32, (y as f32 + ty) / height as f32);
         let pdf = self.density(&place) / lat_long_jacobian(uv.y);
-        ((self.world_from_local * direction_from_lat_long(uv)).normalize_or(Vec3::Y), pdf)
+        ((self.world_from_local * direction_from_lat_long(uv)).normalize_or(Vec3::Y), pdf, self.radiance(&place))
     }
 
     /// Cells of the bilinear grid: one a column, and one between each two rows.
@@ -120,10 +126,9 @@ impl Envmap {
         row(place.y[0]).lerp(row(place.y[1]), place.at.y) * self.scale
     }
 
-    /// Luminance times sine at a pixel. (An image of one or two rows is nothing but poles: no sine there.)
+    /// Luminance times sine at a pixel.
     fn corner(&self, x: usize, y: usize) -> f32 {
-        let sine = if self.image.height < 3 { 1.0 } else { (PI * y as f32 / (self.image.height - 1) as f32).sin() };
-        (luminance(self.image.pixel(x, y)) * sine).max(0.0)
+        (luminance(self.image.pixel(x, y)) * self.sines[y]).max(0.0)
     }
 
     fn corners(&self, place: &Place) -> [[f32; 2]; 2] {
@@ -140,31 +145,6 @@ impl Envmap {
 /// Solid angle of a unit of lat-long area: 2 π² sin θ.
 fn lat_long_jacobian(v: f32) -> f32 {
     2.0 * PI * PI * (v * PI).sin().max(1e-5)
-}
-
-/// Running sums from 0 to 1 and the total before normalisation; steps of equal height where everything is zero.
-pub(super) fn normalised_sums(values: impl IntoIterator<Item = f64>) -> (Vec<f32>, f64) {
-    let mut sums = vec![0.0];
-    let mut total = 0.0;
-    for v in values {
-        total += v;
-        sums.push(total);
-    }
-    let last = sums.len() - 1;
-    let normalised = sums.iter().enumerate().map(|(i, s)| match i {
-        i if i == last => 1.0,
-        _ if total > 0.0 => (s / total) as f32,
-        i => i as f32 / last as f32,
-    });
-    (normalised.collect(), total)
-}
-
-/// The step of normalised running sums that `u` falls into, and where in the step, in [0, 1).
-pub(super) fn pick(sums: &[f32], u: f32) -> (usize, f32) {
-    let step = sums.partition_point(|&s| s <= u).clamp(1, sums.len() - 1) - 1;
-    let height = sums[step + 1] - sums[step];
-    let rest = if height > 0.0 { (u - sums[step]) / height } else { 0.0 };
-    (step, rest.clamp(0.0, 1.0 - f32::EPSILON))
 }
 
 /// Draws from a density on [0, 1] that goes linearly from `a` to `b`.
@@ -244,9 +224,11 @@ mod tests {
         for_each_cell(768, |bin, d, sr| expected[bin] += f64::from(map.pdf(d) * sr));
         let mut found = [0f64; 72];
         for i in 0..N {
-            let (d, pdf) = map.sample(Sampler::new(3, i).next_2d());
+            let (d, pdf, radiance) = map.sample(Sampler::new(3, i).next_2d());
             let again = map.pdf(d);
             assert!((pdf - again).abs() < 2e-2 * pdf.max(0.05), "{d}: {pdf} and {again}");
+            let seen = map.eval(d);
+            assert!((radiance - seen).abs().max_element() < 2e-2 * seen.max_element().max(0.05), "{d}: {radiance} and {seen}");
             let uv = lat_long_from_direction(d);
             found[((uv.y * 6.0) as usize).min(5) * 12 + (uv.x * 12.0) as usize] += 1.0 / f64::from(N);
         }
@@ -264,8 +246,8 @@ mod tests {
         const N: u32 = 4096;
         let mut found = Rgb::ZERO;
         for i in 0..N {
-            let (d, pdf) = map.sample(Sampler::new(9, i).next_2d());
-            found += map.eval(d) / pdf / N as f32;
+            let (_, pdf, radiance) = map.sample(Sampler::new(9, i).next_2d());
+            found += radiance / pdf / N as f32;
         }
         assert!(((found - expected) / expected).abs().max_element() < 0.01, "{found}, expected {expected}");
     }

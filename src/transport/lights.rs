@@ -5,7 +5,8 @@
 //! normal, which Mitsuba replaces by the shading normal on smooth meshes.
 
 use super::Surface;
-use super::envmap::{Envmap, normalised_sums, pick};
+use super::envmap::Envmap;
+use super::steps::Steps;
 use crate::math::Rgb;
 use crate::scene::{Emitter, Scene, Texture};
 use glam::{Vec2, Vec3};
@@ -22,8 +23,8 @@ pub struct Lights {
 /// An emitter that emits.
 #[derive(Debug)]
 enum Light {
-    /// Index into `Scene::emitters`, and the running sums of its triangles' areas.
-    Area { emitter: u32, sums: Vec<f32> },
+    /// Index into `Scene::emitters`, and the distribution of its triangles' areas.
+    Area { emitter: u32, triangles: Steps },
     /// Light from infinity.
     Environment(Environment),
     /// Point, spot or directional: index into `Scene::emitters`.
@@ -64,10 +65,10 @@ impl Lights {
                 Emitter::Area { object, .. } => {
                     let triangles = scene.geometry.objects[*object as usize].triangles.clone();
                     let areas = triangles.map(|t| 0.5 * f64::from(scene.geometry.area_normal(t).length()));
-                    let (sums, area) = normalised_sums(areas);
+                    let (triangles, area) = Steps::new(areas);
                     if area > 0.0 && area.is_finite() {
                         this.pdf_area[i] = (1.0 / area) as f32;
-                        this.lights.push(Light::Area { emitter: index, sums });
+                        this.lights.push(Light::Area { emitter: index, triangles });
                     }
                 }
                 Emitter::Envmap { image, scale, to_world } => {
@@ -93,11 +94,14 @@ impl Lights {
         let count = self.lights.len();
         let light = self.lights.get(((u * count as f32) as usize).min(count.saturating_sub(1)))?;
         match light {
-            Light::Area { emitter, sums } => self.sample_area(scene, p, *emitter, sums, v),
+            Light::Area { emitter, triangles } => self.sample_area(scene, p, *emitter, triangles, v),
             Light::Environment(environment) => {
-                let wi = environment.sample(v);
-                let pdf = self.pdf_environment(wi);
-                let weight = self.environment(wi) / pdf;
+                let (wi, mut pdf, mut radiance) = environment.sample(v);
+                if self.environments().nth(1).is_some() {
+                    (pdf, radiance) = (self.environments().map(|e| e.pdf(wi)).sum(), self.environment(wi));
+                }
+                pdf *= self.choice_pdf();
+                let weight = radiance / pdf;
                 let sample = LightSample { wi, distance: f32::INFINITY, point: Vec3::ZERO, weight, pdf, delta: false };
                 (pdf > 0.0).then_some(sample)
             }
@@ -109,10 +113,10 @@ impl Lights {
         }
     }
 
-    fn sample_area(&self, scene: &Scene, p: Vec3, emitter: u32, sums: &[f32], v: Vec2) -> Option<LightSample> {
+    fn sample_area(&self, scene: &Scene, p: Vec3, emitter: u32, triangles: &Steps, v: Vec2) -> Option<LightSample> {
         let Emitter::Area { object, radiance } = &scene.emitters[emitter as usize] else { return None };
         let (geometry, object) = (&scene.geometry, &scene.geometry.objects[*object as usize]);
-        let (step, rest) = pick(sums, v.x);
+        let (step, rest) = triangles.pick(v.x);
         let triangle = object.triangles.start + step as u32;
         let root = (1.0 - rest).sqrt();
         let [b, c] = [root * v.y, 1.0 - root];
@@ -191,14 +195,15 @@ impl Environment {
         }
     }
 
-    fn sample(&self, v: Vec2) -> Vec3 {
+    /// A direction, its density and the radiance from there.
+    fn sample(&self, v: Vec2) -> (Vec3, f32, Rgb) {
         match self {
-            Self::Map(map) => map.sample(v).0,
-            Self::Constant(_) => {
+            Self::Map(map) => map.sample(v),
+            Self::Constant(radiance) => {
                 let z = 1.0 - 2.0 * v.y;
                 let (sin_phi, cos_phi) = (v.x * 2.0 * PI).sin_cos();
                 let r = (1.0 - z * z).max(0.0).sqrt();
-                Vec3::new(r * cos_phi, r * sin_phi, z)
+                (Vec3::new(r * cos_phi, r * sin_phi, z), 0.25 / PI, *radiance)
             }
         }
     }

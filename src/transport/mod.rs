@@ -6,6 +6,7 @@ pub mod envmap;
 pub mod lights;
 pub mod path;
 pub mod sampler;
+mod steps;
 pub mod surface;
 pub mod world;
 

@@ -1,0 +1,92 @@
+//! Discrete distributions, sampled by inversion.
+
+/// Running sums of a discrete distribution, with a table that tells where to begin to look.
+#[derive(Debug, Clone)]
+pub struct Steps {
+    /// From 0 to 1; one entry more than there are outcomes.
+    sums: Vec<f32>,
+    /// For each of as many equal parts of [0, 1] as there are outcomes: the first step that may hold one of its numbers.
+    guide: Vec<u32>,
+}
+
+impl Steps {
+    /// The distribution in proportion to `values` (not negative, at least one), and their sum. Even where that is zero.
+    pub fn new(values: impl IntoIterator<Item = f64>) -> (Self, f64) {
+        let mut running = vec![0.0];
+        let mut total = 0.0;
+        for v in values {
+            total += v;
+            running.push(total);
+        }
+        let last = running.len() - 1;
+        let sums: Vec<f32> = running
+            .iter()
+            .enumerate()
+            .map(|(i, s)| match i {
+                i if i == last => 1.0,
+                _ if total > 0.0 => (s / total) as f32,
+                i => i as f32 / last as f32,
+            })
+            .collect();
+        let mut step = 0;
+        let guide = (0..last)
+            .map(|part| {
+                // One part early, against rounding.
+                let low = (part.max(1) - 1) as f32 / last as f32;
+                while step + 1 < last && sums[step + 1] <= low {
+                    step += 1;
+                }
+                step as u32
+            })
+            .collect();
+        (Self { sums, guide }, total)
+    }
+
+    /// The outcome that `u` in [0, 1) falls on, and where in its step, in [0, 1).
+    pub fn pick(&self, u: f32) -> (usize, f32) {
+        let last = self.guide.len();
+        let part = ((u * last as f32) as usize).min(last - 1);
+        let mut step = self.guide[part] as usize;
+        while step + 1 < last && self.sums[step + 1] <= u {
+            step += 1;
+        }
+        let height = self.sums[step + 1] - self.sums[step];
+        let rest = if height > 0.0 { (u - self.sums[step]) / height } else { 0.0 };
+        (step, rest.clamp(0.0, 1.0 - f32::EPSILON))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_guide_finds_what_a_search_finds() {
+        let mut x = 1u32;
+        for count in [1, 2, 7, 300] {
+            let values: Vec<f64> = (0..count)
+                .map(|i| {
+                    x = crate::math::hash_words(&[x, i]);
+                    if x % 3 == 0 { 0.0 } else { f64::from(x >> 20).powi(3) }
+                })
+                .collect();
+            let (steps, total) = Steps::new(values.iter().copied());
+            assert_eq!(total, values.iter().sum::<f64>());
+            for i in 0..20_000u32 {
+                let u = crate::math::hash_words(&[i, 5]) as f32 / (1u64 << 32) as f32;
+                let u = if i < 300 { steps.sums[i as usize % count as usize] } else { u.min(1.0 - f32::EPSILON) };
+                let searched = steps.sums.partition_point(|&s| s <= u).clamp(1, count as usize) - 1;
+                let (found, rest) = steps.pick(u);
+                assert_eq!(found, searched, "u {u} of {count}");
+                assert!((0.0..1.0).contains(&rest) && (values[found] > 0.0 || total == 0.0 || u >= 1.0 - 1e-6));
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_but_zeros_is_even() {
+        let (steps, total) = Steps::new([0.0; 4]);
+        assert_eq!(total, 0.0);
+        assert_eq!(steps.pick(0.6), (2, 0.4000001));
+    }
+}
