@@ -6,8 +6,8 @@
 //! Westin 1993), so that it counts once; each pass is normalised by its own spatial and range weights.
 //! Ours, after measurements: E is not let below [`FilterParams::min_energy`], since one perfect sample must not outshine all others, and zero
 //! must not divide; at 3, the most that a sample of the right reflected material reaches, 1/E only tells the wrong ones. The kernel may
-//! have the tails of GGX, (1 + q)⁻², instead of a Gaussian's. Normals must be closer, so that a bevel keeps its edge; the depth threshold
-//! is wide, for 0.2 m cuts a floor's kernel at a visible line.
+//! have the tails of GGX, (1 + q)⁻², instead of a Gaussian's, which widen bright highlights too much. Normals must be closer, so that a
+//! bevel keeps its edge; the depth threshold is a little wider, for 0.2 m can cut a floor's kernel at a visible line.
 //!
 //! In: linear radiance and its guides a pixel, covariance in pixels². Out: linear radiance. Pixels without a glossy surface neither
 //! give nor take.
@@ -61,7 +61,7 @@ pub struct FilterParams {
     pub method: Method,
     /// Smallest cosine between two normals that may mix, α_n. Paper: 0.8; ours, 0.95.
     pub min_normal_cos: f32,
-    /// Largest difference in depth that may mix, α_d, m. Paper: 0.2.
+    /// Largest difference in depth that may mix, α_d, m. Paper: 0.2; ours, 0.3.
     pub depth_threshold: f32,
     /// Lower clamp of E in the confidence 1/E; infinite for no confidence at all. Paper: none (a small one against 0).
     pub min_energy: f32,
@@ -74,10 +74,10 @@ pub struct FilterParams {
 impl Default for FilterParams {
     fn default() -> Self {
         Self {
-            kernel: Kernel::Ggx,
+            kernel: Kernel::Gaussian,
             method: Method::FourPass,
             min_normal_cos: 0.95,
-            depth_threshold: 1.0,
+            depth_threshold: 0.3,
             min_energy: 3.0,
             radius_sigmas: 3.0,
             max_radius: 128.0,
@@ -88,7 +88,7 @@ impl Default for FilterParams {
 impl FilterParams {
     /// The paper's text.
     pub fn paper() -> Self {
-        Self { kernel: Kernel::Gaussian, min_normal_cos: 0.8, depth_threshold: 0.2, min_energy: 1e-3, ..Self::default() }
+        Self { min_normal_cos: 0.8, depth_threshold: 0.2, min_energy: 1e-3, ..Self::default() }
     }
 }
 

@@ -47,7 +47,7 @@ pub struct GatherParams {
     pub search: Vec<SearchLevel>,
     /// s_a, the factor on the energy where the reflected materials differ. *Paper*: 10.
     pub material_penalty: f32,
-    /// φ, the falloff of a sample's weight with its energy (Eq. 2). *Paper*: 8.
+    /// φ, the falloff of a sample's weight with its energy (Eq. 2). *Paper*: 8. *Ours*: 16.
     pub falloff: f32,
     /// How many of the eight nearest probes are asked, those of largest weight first. *Paper*: 8.
     pub probes: usize,
@@ -65,6 +65,7 @@ impl Default for GatherParams {
         let finest = SearchLevel { radius: 1, step: 1.0 };
         Self {
             search: [paper.search, vec![finest]].concat(),
+            falloff: 16.0,
             bilinear: BilinearRule::SameReflectorAndReflected,
             albedo_ratio: true,
             perturb: PerturbParams::default(),
