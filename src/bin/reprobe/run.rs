@@ -111,7 +111,7 @@ impl Preset {
                 lightmap_spp: 96,
                 lightmap_texels: 150_000,
                 size: [320, 180],
-                supersample: 1,
+                supersample: 2,
                 reference_spp: 32,
                 all_texels: false,
             },
