@@ -67,7 +67,7 @@ mod tests {
             let values: Vec<f64> = (0..count)
                 .map(|i| {
                     x = crate::math::hash_words(&[x, i]);
-                    if x % 3 == 0 { 0.0 } else { f64::from(x >> 20).powi(3) }
+                    if x.is_multiple_of(3) { 0.0 } else { f64::from(x >> 20).powi(3) }
                 })
                 .collect();
             let (steps, total) = Steps::new(values.iter().copied());
