@@ -61,7 +61,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 const RUN: &str = "run scene.xml --path path.json -o out --preset draft --probes 8 --probe-size 32x16 --spp 4 --size 32x18 \
-    --lightmap-spp 4 --texel 0.2 --reference-spp 8";
+    --lightmap-spp 4 --texel 0.2 --reference-spp 8 --supersample 1";
 
 /// Content of every file below a folder, by relative path, but for those that hold times.
 fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
