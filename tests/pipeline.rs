@@ -107,6 +107,14 @@ fn run_makes_frames_and_a_report_and_threads_do_not_change_a_bit() {
 }
 
 #[test]
+fn run_goes_through_with_the_papers_text() {
+    let f = Folder::new();
+    f.figures(&format!("{RUN} --paper"));
+    let frame = ExrImage::read(&f.at("out/frames/0001.exr")).unwrap();
+    assert!(frame.rgb(Path::new(""), "glossy").unwrap().iter().any(|p| p.max_element() > 0.0));
+}
+
+#[test]
 fn run_compares_the_layers_that_a_reference_has() {
     let f = Folder::new();
     std::fs::create_dir(f.at("given")).unwrap();

@@ -59,9 +59,9 @@ impl Default for PerturbParams {
 }
 
 impl PerturbParams {
-    /// The paper's text.
+    /// The paper's text. (The limit is not infinite, which JSON could not say.)
     pub fn paper() -> Self {
-        Self { exact_plane: false, second_order_limit: f32::INFINITY, min_focus: 1e-4, ..Self::default() }
+        Self { exact_plane: false, second_order_limit: f32::MAX, min_focus: 1e-4, ..Self::default() }
     }
 }
 

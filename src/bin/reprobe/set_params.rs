@@ -62,5 +62,7 @@ mod tests {
         assert!(message.contains("gather.falloff=16"), "{message}");
         assert!(set("gather.falloff=many").is_err());
         assert!(set("gather.falloff").is_err());
+        let paper = GlossyProbeParams::paper();
+        assert_eq!(apply(&paper, &[]).unwrap(), paper, "a parameter that JSON cannot say");
     }
 }
