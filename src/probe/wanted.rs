@@ -38,7 +38,7 @@ pub struct Views {
     pub cameras: Vec<String>,
     /// Rays a pixel, along one side.
     pub supersample: u32,
-    /// How the texels are chosen; what is then made of their colours is set to the default.
+    /// How the texels are chosen; what is then made of their colours is set to the paper's.
     pub gather: GatherParams,
 }
 
@@ -52,7 +52,7 @@ impl Views {
             hash.update(bytemuck::cast_slice(&c.size));
             hash.finalize().to_hex().to_string()
         };
-        let GatherParams { falloff, bilinear, albedo_ratio, .. } = GatherParams::default();
+        let GatherParams { falloff, bilinear, albedo_ratio, .. } = GatherParams::paper();
         let gather = GatherParams { falloff, bilinear, albedo_ratio, ..gather.clone() };
         Self { cameras: cameras.iter().map(hash).collect(), supersample, gather }
     }
