@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let e = map.lookup(surface.triangle, surface.barycentric, back);
                 sum[0] += bsdf.diffuse_out(&surface, wo) * e / std::f32::consts::PI;
                 let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
-                sum[1] += scattered(&world, &surface, -ray.d, query, &PathParams::default(), &mut sampler);
+                sum[1] += scattered(&world, &surface, -ray.d, query, None, &PathParams::default(), &mut sampler);
                 sum[2] += e / std::f32::consts::PI;
             }
             sum.map(|c| c / spp as f32)

@@ -56,6 +56,11 @@ pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
     n * (2.0 * n.dot(w)) - w
 }
 
+/// Uniform number in [0, 1) of the upper 24 of random bits.
+pub fn unit(bits: u32) -> f32 {
+    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
 /// Largest integer not above `x`, saturating. Without SSE4.1, which the baseline lacks, `f32::floor` is a call.
 pub fn floor(x: f32) -> i64 {
     let i = x as i64;

@@ -11,7 +11,7 @@ use reprobe::transport::bsdf::{
     Bsdf, Conductor, Diffuse, Distribution, Lobes, PlasticParams, Query, RoughConductor, RoughPlastic,
 };
 use reprobe::transport::lights::Lights;
-use reprobe::transport::path::{PathParams, radiance, scattered, scattered_onto_known, trace_layers, transmitted_irradiance};
+use reprobe::transport::path::{PathParams, radiance, scattered, trace_layers, transmitted_irradiance};
 use reprobe::transport::{Ray, Sampler, Surface, World};
 use room::Room;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
@@ -118,9 +118,9 @@ fn known_diffuse_light_stands_in_for_the_paths_that_would_find_it() {
     let surface = world.intersect(&ray).unwrap();
     let known = |s: &Surface, _: Vec3| if s.object == walls { glow * 0.6 / (1.0 - 0.6) } else { Rgb::ZERO };
     let query = Query { lobes: Lobes::NON_DIFFUSE, ..Query::default() };
-    let found = scattered_onto_known(&world, &surface, -ray.d, query, &known, &mut Sampler::new(1, 1));
+    let found = scattered(&world, &surface, -ray.d, query, Some(&known), &PathParams::default(), &mut Sampler::new(1, 1));
     assert!((found - glow / (1.0 - 0.6)).abs().max_element() < 1e-5, "{found}");
-    estimate(8192, 21, |s| scattered(&world, &surface, -ray.d, query, &PathParams::default(), s)).assert_is(found, 0.01);
+    estimate(8192, 21, |s| scattered(&world, &surface, -ray.d, query, None, &PathParams::default(), s)).assert_is(found, 0.01);
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn emitter_samples_bsdf_samples_and_both_agree() {
         let wi = surface.frame.to_local(-ray.d);
         let bsdf = &world.scene.materials[surface.material as usize].bsdf;
         let seed = 10 * i as u32;
-        let both = estimate(16384, seed, |s| scattered(&world, &surface, -ray.d, Query::default(), &ONE_BOUNCE, s));
+        let both = estimate(16384, seed, |s| scattered(&world, &surface, -ray.d, Query::default(), None, &ONE_BOUNCE, s));
         let emitters = estimate(65536, seed + 1, |s| {
             let [x, y, u, _] = s.next_4d();
             match world.lights.sample(&world.scene, surface.p, u, Vec2::new(x, y)) {
@@ -189,7 +189,7 @@ fn emitter_samples_bsdf_samples_and_both_agree() {
         both.assert_agrees(&emitters, 0.03);
         // A world that does not know its emitters has nothing to weigh against.
         let blind = World { lights: Lights::default(), ..world };
-        let bsdfs = estimate(65536, seed + 2, |s| scattered(&blind, &surface, -ray.d, Query::default(), &ONE_BOUNCE, s));
+        let bsdfs = estimate(65536, seed + 2, |s| scattered(&blind, &surface, -ray.d, Query::default(), None, &ONE_BOUNCE, s));
         both.assert_agrees(&bsdfs, 0.03);
     }
 }
@@ -215,7 +215,7 @@ fn the_light_map_quantity_times_the_views_factor_is_the_diffuse_layer() {
         let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(&surface, wi);
         let stored = estimate(16384, 7, |s| transmitted_irradiance(&world, &surface, false, &params, s) * out * FRAC_1_PI);
         let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
-        let layer = estimate(16384, 8, |s| scattered(&world, &surface, -ray.d, query, &params, s));
+        let layer = estimate(16384, 8, |s| scattered(&world, &surface, -ray.d, query, None, &params, s));
         stored.assert_agrees(&layer, 0.02);
     }
 }

@@ -7,7 +7,7 @@ use crate::math::{Rgb, hash_words};
 use crate::progress::Progress;
 use crate::render::mirror::mirror_hit;
 use crate::transport::bsdf::{Lobes, Query};
-use crate::transport::path::{PathParams, scattered, scattered_onto_known};
+use crate::transport::path::{KnownDiffuse, PathParams, scattered};
 use crate::transport::{Ray, Sampler, Surface, World};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -123,10 +123,8 @@ fn glossy_texel(bake: &Bake, position: Vec3, map: &ParameterMap, texel: u32, str
                 (surface, wo) = (s, -d);
             }
         }
-        sum += match &known {
-            Some(known) => scattered_onto_known(world, &surface, wo, query, known, &mut sampler),
-            None => scattered(world, &surface, wo, query, &PathParams::default(), &mut sampler),
-        };
+        let known = known.as_ref().map(|known| known as KnownDiffuse);
+        sum += scattered(world, &surface, wo, query, known, &PathParams::default(), &mut sampler);
     }
     Some(sum / params.spp as f32)
 }

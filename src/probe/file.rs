@@ -110,23 +110,23 @@ impl Probe {
 
     /// Index of the texel that holds the continuous coordinate `x` (wraps in u, clamps in v).
     pub fn index_at(&self, x: Vec2) -> usize {
-        self.row(x.y) + self.column(x.x)
-    }
-
-    /// Index of the first texel of the row that holds the continuous coordinate `y` (clamps).
-    pub fn row(&self, y: f32) -> usize {
-        floor(y).clamp(0, i64::from(self.size[1]) - 1) as usize * self.size[0] as usize
-    }
-
-    /// Column that holds the continuous coordinate `x` (wraps).
-    pub fn column(&self, x: f32) -> usize {
-        let (x, width) = (floor(x), i64::from(self.size[0]));
-        if (0..width).contains(&x) { x as usize } else { x.rem_euclid(width) as usize }
+        self.index(floor(x.x), floor(x.y))
     }
 
     /// Index of an integer texel coordinate (wraps in u, clamps in v).
-    pub fn index(&self, x: i32, y: i32) -> usize {
-        self.row(y as f32) + self.column(x as f32)
+    pub fn index(&self, x: i64, y: i64) -> usize {
+        self.row(y) + self.column(x)
+    }
+
+    /// Index of the first texel of row `y` (clamps).
+    pub fn row(&self, y: i64) -> usize {
+        y.clamp(0, i64::from(self.size[1]) - 1) as usize * self.size[0] as usize
+    }
+
+    /// Column `x` (wraps).
+    pub fn column(&self, x: i64) -> usize {
+        let width = i64::from(self.size[0]);
+        if (0..width).contains(&x) { x as usize } else { x.rem_euclid(width) as usize }
     }
 
     /// The probe's image, with its parameterisation.

@@ -18,6 +18,9 @@ use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 use std::path::Path;
 
+/// Default of [`Smoothness::Lobe`]'s α½.
+pub const ALPHA_HALF: f32 = 0.05;
+
 /// What m_mat makes of roughness.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -62,7 +65,7 @@ pub struct ResmapParams {
 
 impl Default for ResmapParams {
     fn default() -> Self {
-        Self { smoothness: Smoothness::Lobe { alpha_half: 0.05 }, ..Self::paper() }
+        Self { smoothness: Smoothness::Lobe { alpha_half: ALPHA_HALF }, ..Self::paper() }
     }
 }
 

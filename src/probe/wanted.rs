@@ -10,7 +10,7 @@ use super::qhmap::ParameterMap;
 use crate::Result;
 use crate::progress::Progress;
 use crate::render::candidates::NearCandidates;
-use crate::render::gather::{GatherParams, WeightedProbe, best_samples, footprint_texels, tiles};
+use crate::render::gather::{GatherParams, best_samples, footprint_texels, tiles};
 use crate::render::gbuffer::gbuffer;
 use crate::render::glossy_probes::nearest_probes;
 use crate::render::mirror::mirror_pass;
@@ -87,17 +87,13 @@ pub fn wanted_texels(
                 entry.insert((probe, flags));
             }
         }
-        let indexed: Vec<_> = near.iter().map(|(index, _)| (*index, &probes[index].0)).collect();
-        candidates.update(&world.scene.geometry, &indexed);
-        let weighted: Vec<_> = near
-            .iter()
-            .map(|&(index, weight)| WeightedProbe { index, probe: &probes[&index].0, candidates: candidates.of(index), weight })
-            .collect();
+        let near: Vec<_> = near.iter().map(|&(index, weight)| (index, &probes[&index].0, weight)).collect();
+        let weighted = candidates.of(&world.scene.geometry, &near);
         let fine = Camera { size: camera.size.map(|s| s * views.supersample), ..camera.clone() };
         let view = gbuffer(world, curvature, &fine);
         let reflected = mirror_pass(world, &view);
         tiles(&view, &reflected).par_iter().for_each(|tile| {
-            for samples in best_samples(&view, &reflected, tile, &weighted, &views.gather) {
+            for samples in best_samples(fine.position(), &reflected, tile, &weighted, &views.gather) {
                 for (w, sample) in weighted.iter().zip(samples) {
                     let Some(sample) = sample else { continue };
                     for texel in footprint_texels(w.probe, sample.texel) {

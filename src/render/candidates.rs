@@ -1,6 +1,6 @@
 //! What the search over a probe's texels compares, made ready: a candidate is one record to read, without arithmetic.
 
-use super::gather::Reflection;
+use super::gather::{Reflection, WeightedProbe};
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
 use crate::scene::Geometry;
 use glam::Vec3;
@@ -62,16 +62,14 @@ fn reflector(geometry: &Geometry, texel: &Texel, eye: Vec3) -> (Vec3, Vec3) {
 pub struct NearCandidates(BTreeMap<usize, Vec<Candidate>>);
 
 impl NearCandidates {
-    /// Makes those of `near` (index and probe) that are missing, and drops those of all other probes.
-    pub fn update(&mut self, geometry: &Geometry, near: &[(usize, &Probe)]) {
-        self.0.retain(|index, _| near.iter().any(|(i, _)| i == index));
-        for &(index, probe) in near {
+    /// The probes `near` the camera (index, probe, weight), ready for the gather. Makes the candidates that are missing, and drops
+    /// those of all other probes.
+    pub fn of<'a>(&'a mut self, geometry: &Geometry, near: &[(usize, &'a Probe, f32)]) -> Vec<WeightedProbe<'a>> {
+        self.0.retain(|index, _| near.iter().any(|(i, ..)| i == index));
+        for &(index, probe, _) in near {
             self.0.entry(index).or_insert_with(|| candidates(geometry, probe));
         }
-    }
-
-    /// Those of a probe that was among the last update's.
-    pub fn of(&self, index: usize) -> &[Candidate] {
-        &self.0[&index]
+        let of = |&(index, probe, weight)| WeightedProbe { index, probe, candidates: &self.0[&index], weight };
+        near.iter().map(of).collect()
     }
 }

@@ -9,7 +9,7 @@ use super::candidates::Candidate;
 use super::gbuffer::{GBuffer, Pixel};
 use super::mirror::{NOTHING, Reflected};
 use super::perturb::{PerturbParams, Perturbation};
-use crate::math::Rgb;
+use crate::math::{Rgb, floor};
 use crate::probe::file::{Probe, Texel};
 use crate::transport::World;
 use glam::{Vec2, Vec3};
@@ -69,7 +69,7 @@ impl Default for GatherParams {
             bilinear: BilinearRule::SameReflectorAndReflected,
             albedo_ratio: true,
             perturb: PerturbParams::default(),
-            ..Self::paper()
+            ..paper
         }
     }
 }
@@ -106,13 +106,18 @@ fn reflected_distance(view: &Reflected, probe: &Reflected) -> f32 {
     if view.is_sky() == probe.is_sky() { view.point.distance(probe.point) } else { 1.0 }
 }
 
-/// E of Eq. 1: how badly a probe's sample stands in for the view's. Zero is a perfect match; at most 3 s_a.
-pub fn energy(view: &Reflection, probe: &Reflection, material_penalty: f32) -> f32 {
+/// E of Eq. 1, how badly a probe's sample stands in for the view's, where it is below `limit`. Zero is a perfect match; at most 3 s_a.
+fn energy_below(limit: f32, view: &Reflection, probe: &Reflection, material_penalty: f32) -> Option<f32> {
     let s_a = if view.reflected.material == probe.reflected.material { 1.0 } else { material_penalty };
-    let s_b = reflected_distance(&view.reflected, &probe.reflected);
+    let s_b = reflected_distance(&view.reflected, &probe.reflected).min(1.0);
+    // The reflected hit alone rules most texels out.
+    if s_a * s_b >= limit {
+        return None;
+    }
     let s_c = 1.0 - view.normal.dot(probe.normal);
     let s_d = 1.0 - view.direction.dot(probe.direction);
-    s_a * (s_b.min(1.0) + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0))
+    let energy = s_a * (s_b + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0));
+    (energy < limit).then_some(energy)
 }
 
 /// Side of a tile of pixels: what their searches read of a probe, some 100 KB, fits into a core's cache.
@@ -159,33 +164,34 @@ pub fn gather(
     roughness_scale: f32,
     params: &GatherParams,
 ) -> Vec<Gathered> {
+    let eye = view.camera.position();
     let tiles = tiles(view, reflected);
     let gathered: Vec<Vec<Gathered>> = tiles
         .par_iter()
         .map(|tile| {
-            let samples = best_samples(view, reflected, tile, probes, params);
-            let blended = tile.iter().zip(&samples).map(|(&i, samples)| match &view.pixels[i] {
-                Some(pixel) => blend(world, pixel, samples, probes, roughness_scale, params),
-                None => Gathered::NONE,
-            });
+            let samples = best_samples(eye, reflected, tile, probes, params);
+            let blended = tile.iter().zip(&samples).map(|((_, p), s)| blend(world, p, s, probes, roughness_scale, params));
             blended.collect()
         })
         .collect();
     let mut image = vec![Gathered::NONE; view.pixels.len()];
-    for (&i, g) in tiles.iter().flatten().zip(gathered.iter().flatten()) {
-        image[i] = *g;
+    for ((i, _), g) in tiles.iter().flatten().zip(gathered.iter().flatten()) {
+        image[*i] = *g;
     }
     image
 }
 
-/// The glossy pixels of a view that reflect something, square by square: neighbours search the same texels of a probe, which then
-/// stay in the cache.
-pub fn tiles(view: &GBuffer, reflected: &[Reflected]) -> Vec<Vec<usize>> {
+/// The glossy pixels of a view that reflect something, with their indices, square by square: neighbours search the same texels of a
+/// probe, which then stay in the cache.
+pub fn tiles<'a>(view: &'a GBuffer, reflected: &[Reflected]) -> Vec<Vec<(usize, &'a Pixel)>> {
     let [width, height] = view.size();
-    let glossy = |&i: &usize| view.pixels[i].as_ref().is_some_and(|p| p.alpha.is_some()) && reflected[i].material != NOTHING;
+    let glossy = |i: usize| {
+        let pixel = view.pixels[i].as_ref().filter(|p| p.alpha.is_some() && reflected[i].material != NOTHING);
+        pixel.map(|p| (i, p))
+    };
     let tile = |x: usize, y: usize| {
         let rows = y..(y + TILE).min(height);
-        rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x)).filter(glossy).collect()
+        rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x)).filter_map(glossy).collect()
     };
     (0..height).step_by(TILE).flat_map(|y| (0..width).step_by(TILE).map(move |x| tile(x, y))).collect()
 }
@@ -199,19 +205,18 @@ pub struct Sample {
     pub texel: Vec2,
 }
 
-/// The sample of least energy of each of `probes` (at most eight), for each of the glossy pixels `tile`.
+/// The sample of least energy of each of `probes` (at most eight), for each pixel of one of [`tiles`], as `eye` sees it.
 pub fn best_samples(
-    view: &GBuffer,
+    eye: Vec3,
     reflected: &[Reflected],
-    tile: &[usize],
+    tile: &[(usize, &Pixel)],
     probes: &[WeightedProbe],
     params: &GatherParams,
 ) -> Vec<[Option<Sample>; 8]> {
-    let eye = view.camera.position();
     let pixels: Vec<_> = tile
         .iter()
-        .filter_map(|&i| Some((view.pixels[i].as_ref()?, reflected[i])))
-        .map(|(pixel, reflected)| {
+        .map(|&(i, pixel)| {
+            let reflected = reflected[i];
             let (r, n) = (pixel.surface.p, pixel.normal);
             let at_view = Reflection { normal: n, direction: reflected.direction_from(r), reflected };
             let distance = reflected.distance_from(r);
@@ -256,8 +261,8 @@ fn blend(
 
 /// The texels that [`fetch`] may read for a sample: the four around it.
 pub fn footprint_texels(probe: &Probe, at: Vec2) -> [usize; 4] {
-    let low = (at - 0.5).floor().as_ivec2();
-    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| probe.index(low.x + i, low.y + j))
+    let (x, y) = (floor(at.x - 0.5), floor(at.y - 0.5));
+    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| probe.index(x + i, y + j))
 }
 
 /// The texel coordinate of least energy around the direction from the probe to `x`, coarse level first.
@@ -271,22 +276,15 @@ fn search(w: &WeightedProbe, x: Vec3, material: u32, at_view: &Reflection, param
         let step = probe.map.search_scale(centre) * level.step;
         for j in -level.radius..=level.radius {
             let y = centre.y + step.y * j as f32;
-            let row = probe.row(y);
+            let row = probe.row(floor(y));
             for i in -level.radius..=level.radius {
                 let x = centre.x + step.x * i as f32;
-                let candidate = &w.candidates[row + probe.column(x)];
+                let candidate = &w.candidates[row + probe.column(floor(x))];
                 if candidate.material != material {
                     continue;
                 }
-                // The reflected hit alone rules most texels out.
-                let (view, probe) = (at_view.reflected, candidate.reflection.reflected);
-                let s_a = if view.material == probe.material { 1.0 } else { params.material_penalty };
-                if s_a * reflected_distance(&view, &probe).min(1.0) >= least {
-                    continue;
-                }
-                let e = energy(at_view, &candidate.reflection, params.material_penalty);
-                if e < least {
-                    least = e;
+                if let Some(energy) = energy_below(least, at_view, &candidate.reflection, params.material_penalty) {
+                    least = energy;
                     found = Vec2::new(x, y);
                 }
             }

@@ -4,7 +4,7 @@ use super::candidates::NearCandidates;
 use super::composite::{Previous, diffuse_layer, downsample, reproject_previous};
 use super::filter::{FilterInput, FilterParams, filter};
 use super::footprint::{Footprint, FootprintParams, GlossyPoint};
-use super::gather::{GatherParams, Gathered, WeightedProbe, gather};
+use super::gather::{GatherParams, Gathered, gather};
 use super::gbuffer::{GBuffer, Pixel, gbuffer};
 use super::mirror::{Reflected, mirror_pass};
 use crate::Result;
@@ -124,21 +124,14 @@ impl<'a> Renderer<'a> {
             .into_iter()
             .map(|(index, weight)| Ok((index, probes.probe(index)?, weight)))
             .collect::<Result<_>>()?;
-        let indexed: Vec<_> = near.iter().map(|(index, probe, _)| (*index, &**probe)).collect();
-        self.candidates.update(&self.world.scene.geometry, &indexed);
+        let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
+        let weighted = self.candidates.of(&self.world.scene.geometry, &near);
         clock.lap("load");
         let view = gbuffer(self.world, self.curvature, &fine);
         clock.lap("gbuffer");
         let reflected = mirror_pass(self.world, &view);
         clock.lap("mirror");
         let roughness_scale = probes.set.roughness_scale;
-        let weighted: Vec<_> = near
-            .iter()
-            .map(|(index, probe, weight)| {
-                let candidates = self.candidates.of(*index);
-                WeightedProbe { index: *index, probe, candidates, weight: *weight }
-            })
-            .collect();
         let mut gathered = gather(self.world, &view, &reflected, &weighted, roughness_scale, &self.params.gather);
         let unserved = reproject_previous(&view, &mut gathered, self.previous.as_ref());
         clock.lap("gather");

@@ -52,7 +52,8 @@ impl Layers {
 }
 
 /// Diffuse radiance that leaves a surface in a direction (unit, world, away from it), known from elsewhere: a light map.
-/// Paths that are given one read it at every vertex but their first, and go on by the non-diffuse lobes alone.
+/// Paths that are given one read it at every vertex but their first, and go on by the non-diffuse lobes alone: less noise, far
+/// shorter paths, and the bias of what is known.
 pub type KnownDiffuse<'a> = &'a (dyn Fn(&Surface, Vec3) -> Rgb + Sync);
 
 /// One sample of the three layers along a camera ray.
@@ -67,7 +68,7 @@ pub fn trace_layers(world: &World, ray: &Ray, params: &PathParams, sampler: &mut
             return Rgb::ZERO;
         }
         let query = Query { lobes, ..Query::default() };
-        scattered(world, &surface, wo, query, params, &mut sampler.branch(branch))
+        scattered(world, &surface, wo, query, None, params, &mut sampler.branch(branch))
     };
     Layers {
         emission: keep_finite(world.lights.emitted(&world.scene, &surface, wo)),
@@ -84,25 +85,12 @@ pub fn scattered(
     surface: &Surface,
     wo_world: Vec3,
     query: Query,
+    known: Option<KnownDiffuse>,
     params: &PathParams,
     sampler: &mut Sampler,
 ) -> Rgb {
     let measure = Measure::Scattering { wi: surface.frame.to_local(wo_world), query };
-    integrate(&Vertex { world, surface, measure }, None, params, sampler)
-}
-
-/// [`scattered`], with the diffuse radiance of all later vertices read from `known`: less noise, far shorter paths, and the
-/// bias of what is known.
-pub fn scattered_onto_known(
-    world: &World,
-    surface: &Surface,
-    wo_world: Vec3,
-    query: Query,
-    known: KnownDiffuse,
-    sampler: &mut Sampler,
-) -> Rgb {
-    let measure = Measure::Scattering { wi: surface.frame.to_local(wo_world), query };
-    integrate(&Vertex { world, surface, measure }, Some(known), &PathParams::default(), sampler)
+    integrate(&Vertex { world, surface, measure }, known, params, sampler)
 }
 
 /// Incident, not scattered light: one sample of the light map's quantity ∫ T_in(ω) L(ω) cos θ dω at `surface`, on the side of

@@ -5,7 +5,7 @@
 //! independent. A path draws two sets a vertex; past [`SOBOL_SETS`], where stratification no longer shows, sets are plain
 //! hashes, which cost a third.
 
-use crate::math::{hash_words, hash64};
+use crate::math::{hash_words, hash64, unit};
 use glam::Vec2;
 
 /// Sets of four dimensions that are Sobol points; later ones are hashes. Four path vertices.
@@ -46,8 +46,7 @@ impl Sampler {
             let key = (u64::from(self.stream) << 32 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let first = hash64(key ^ hash64(u64::from(set)));
             let second = hash64(first.wrapping_add(0x9e37_79b9_7f4a_7c15));
-            let unit = |bits: u64| (bits as u32 >> 8) as f32 * (1.0 / 16_777_216.0);
-            [unit(first), unit(first >> 32), unit(second), unit(second >> 32)]
+            [first, first >> 32, second, second >> 32].map(|bits| unit(bits as u32))
         }
     }
 

@@ -5,7 +5,7 @@ use crate::probe_set;
 use reprobe::io::Provenance;
 use reprobe::io::provenance::hash_file;
 use reprobe::probe::placement::ProbeGrid;
-use reprobe::probe::resmap::{ResmapParams, Smoothness, resolution_map};
+use reprobe::probe::resmap::{ALPHA_HALF, ResmapParams, Smoothness, resolution_map};
 use reprobe::probe::seen::SeenBuffers;
 use reprobe::probe::set::{ProbeSet, numbered};
 use serde_json::json;
@@ -47,7 +47,7 @@ pub struct Args {
     #[arg(long, value_name = "COS", default_value_t = ResmapParams::default().facing_min)]
     facing_min: f32,
     /// Roughness alpha that deserves half of a mirror's texels
-    #[arg(long, value_name = "ALPHA", default_value_t = 0.05)]
+    #[arg(long, value_name = "ALPHA", default_value_t = ALPHA_HALF)]
     alpha_half: f32,
     /// The paper's text in every choice
     #[arg(long, conflicts_with = "alpha_half")]

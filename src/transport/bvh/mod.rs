@@ -16,7 +16,7 @@ mod wide;
 
 use super::surface::uv_at;
 use super::{Hit, Ray};
-use crate::math::{hash_words, luminance};
+use crate::math::{hash_words, luminance, unit};
 use crate::scene::shapes::normals::unit_normal;
 use crate::scene::{Geometry, Scene};
 use glam::Vec3A;
@@ -133,8 +133,7 @@ fn passes(scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
     let Some(opacity) = &scene.materials[object.material as usize].opacity else { return false };
     let words = [ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z].map(f32::to_bits);
     let of_ray = hash_words(&words);
-    let uniform = |hash: u32| (hash >> 8) as f32 * (1.0 / 16_777_216.0);
     // Where a ray's intervals begin is its own.
-    let interval = (hit.t / (SHEET * (1.0 + ray.o.abs().max_element())) + uniform(of_ray)).floor();
-    uniform(hash_words(&[of_ray, object_index, interval.to_bits()])) >= luminance(opacity.eval(uv_at(&scene.geometry, hit)))
+    let interval = (hit.t / (SHEET * (1.0 + ray.o.abs().max_element())) + unit(of_ray)).floor();
+    unit(hash_words(&[of_ray, object_index, interval.to_bits()])) >= luminance(opacity.eval(uv_at(&scene.geometry, hit)))
 }
