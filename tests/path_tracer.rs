@@ -10,6 +10,7 @@ use reprobe::scene::{Camera, Emitter, Texture};
 use reprobe::transport::bsdf::{
     Bsdf, Conductor, Diffuse, Distribution, Lobes, PlasticParams, Query, RoughConductor, RoughPlastic,
 };
+use reprobe::transport::light_tree::Receiver;
 use reprobe::transport::lights::Lights;
 use reprobe::transport::path::{PathParams, radiance, scattered, trace_layers, transmitted_irradiance};
 use reprobe::transport::{Ray, Sampler, Surface, World};
@@ -179,7 +180,7 @@ fn emitter_samples_bsdf_samples_and_both_agree() {
         let both = estimate(16384, seed, |s| scattered(&world, &surface, -ray.d, Query::default(), None, &ONE_BOUNCE, s));
         let emitters = estimate(65536, seed + 1, |s| {
             let [x, y, u, _] = s.next_4d();
-            match world.lights.sample(&world.scene, surface.p, u, Vec2::new(x, y)) {
+            match world.lights.sample(&world.scene, &Receiver { p: surface.p, n: surface.frame.n }, u, Vec2::new(x, y)) {
                 Some(l) if !world.occluded(&surface.spawn_to(l.point)) => {
                     bsdf.eval(&surface, wi, surface.frame.to_local(l.wi), Query::default()) * l.weight
                 }

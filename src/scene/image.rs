@@ -48,10 +48,20 @@ impl Image {
         Self { width, height, pixels: Pixels::Bytes { rgb, linear: Box::new(linear) } }
     }
 
+    /// Mean of all pixels.
+    pub fn mean(&self) -> Rgb {
+        let sum: glam::DVec3 = (0..self.width * self.height).map(|i| self.at(i).as_dvec3()).sum();
+        (sum / (self.width * self.height) as f64).as_vec3()
+    }
+
     /// The pixel in column `x` and row `y`.
     #[inline]
     pub fn pixel(&self, x: usize, y: usize) -> Rgb {
-        let i = y * self.width + x;
+        self.at(y * self.width + x)
+    }
+
+    #[inline]
+    fn at(&self, i: usize) -> Rgb {
         match &self.pixels {
             Pixels::Float(pixels) => pixels[i],
             Pixels::Bytes { rgb, linear } => {

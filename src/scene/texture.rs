@@ -66,6 +66,15 @@ impl Texture {
         }
     }
 
+    /// Mean over the texture's own square.
+    pub fn mean(&self) -> Rgb {
+        match self {
+            Self::Constant(c) => *c,
+            Self::Bitmap(bitmap) => bitmap.image.mean() * bitmap.scale,
+            Self::Checkerboard { color0, color1, .. } => (*color0 + *color1) * 0.5,
+        }
+    }
+
     /// The texture times a factor.
     pub fn scaled(self, factor: f32) -> Self {
         match self {

@@ -1,34 +1,51 @@
 //! Emitter sampling for next-event estimation.
 //!
-//! As Mitsuba: an emitter is chosen uniformly among those that emit, a point on an area light uniformly by area, and an area
-//! light shines from the side that its shading normal points to. Ours: a density by solid angle always uses the geometric
+//! An emitter at a finite distance is chosen by the hierarchy of [`LightTree`], a triangle of an area light at a time; those at infinity
+//! have equal shares with all the others together. A point on a triangle is uniform by area, and an area light shines from
+//! the side that its shading normal points to, as Mitsuba's. Ours: a density by solid angle always uses the geometric
 //! normal, which Mitsuba replaces by the shading normal on smooth meshes.
 
 use super::Surface;
 use super::envmap::Envmap;
-use super::steps::Steps;
-use crate::math::Rgb;
-use crate::scene::{Emitter, Scene, Texture};
+use super::light_tree::{LightBounds, LightTree, Receiver};
+use crate::math::{Rgb, luminance};
+use crate::scene::shapes::normals::unit_normal;
+use crate::scene::{Emitter, Geometry, Object, Scene, Texture};
 use glam::{Vec2, Vec3};
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Sampling distributions of a scene's emitters.
 #[derive(Debug, Default)]
 pub struct Lights {
-    lights: Vec<Light>,
-    /// Density per area of each `Scene::emitters`; 0 for those that are no area lights.
-    pdf_area: Vec<f32>,
+    /// What `tree` chooses from.
+    near: Vec<Near>,
+    tree: LightTree,
+    /// For each of `Scene::emitters`: the first of its triangles in `near`; `None` for those that are no area lights.
+    first: Vec<Option<u32>>,
+    environments: Vec<Environment>,
+    /// Directional emitters: indices into `Scene::emitters`.
+    suns: Vec<u32>,
 }
 
-/// An emitter that emits.
+/// An emitter, or a part of one, at a finite distance.
 #[derive(Debug)]
-enum Light {
-    /// Index into `Scene::emitters`, and the distribution of its triangles' areas.
-    Area { emitter: u32, triangles: Steps },
-    /// Light from infinity.
-    Environment(Environment),
-    /// Point, spot or directional: index into `Scene::emitters`.
+enum Near {
+    Triangle(LightTriangle),
+    /// Point or spot: index into `Scene::emitters`.
     Delta(u32),
+}
+
+/// A triangle of an area light, all in one place.
+#[derive(Debug)]
+struct LightTriangle {
+    corners: [Vec3; 3],
+    /// Unit geometric normal, which way it may point; zero for a triangle without area.
+    normal: Vec3,
+    area: f32,
+    /// Index into `Scene::emitters`.
+    emitter: u32,
+    /// Index into `Geometry::triangles`.
+    index: u32,
 }
 
 #[derive(Debug)]
@@ -57,114 +74,115 @@ pub struct LightSample {
 impl Lights {
     /// Prepares the emitters of a scene.
     pub fn new(scene: &Scene) -> Self {
-        let mut this = Self { lights: Vec::new(), pdf_area: vec![0.0; scene.emitters.len()] };
+        let mut this = Self { first: vec![None; scene.emitters.len()], ..Self::default() };
+        let mut bounds = Vec::new();
         for (i, emitter) in scene.emitters.iter().enumerate() {
-            let index = i as u32;
             match emitter {
-                Emitter::Area { radiance: Texture::Constant(Rgb::ZERO), .. } => {}
-                Emitter::Area { object, .. } => {
-                    let triangles = scene.geometry.objects[*object as usize].triangles.clone();
-                    let areas = triangles.map(|t| 0.5 * f64::from(scene.geometry.area_normal(t).length()));
-                    let (triangles, area) = Steps::new(areas);
-                    if area > 0.0 && area.is_finite() {
-                        this.pdf_area[i] = (1.0 / area) as f32;
-                        this.lights.push(Light::Area { emitter: index, triangles });
+                Emitter::Area { object, radiance } => {
+                    let object = &scene.geometry.objects[*object as usize];
+                    let mean = luminance(radiance.mean());
+                    if mean > 0.0 && mean.is_finite() {
+                        this.first[i] = Some(this.near.len() as u32);
+                        for t in object.triangles.clone() {
+                            let triangle = LightTriangle::new(&scene.geometry, t, i as u32);
+                            bounds.push(triangle.bounds(&scene.geometry, object, mean));
+                            this.near.push(Near::Triangle(triangle));
+                        }
                     }
                 }
                 Emitter::Envmap { image, scale, to_world } => {
-                    this.lights.extend(Envmap::new(image, *scale, to_world).map(|e| Light::Environment(Environment::Map(e))));
+                    this.environments.extend(Envmap::new(image, *scale, to_world).map(Environment::Map));
                 }
                 Emitter::Constant { radiance: Rgb::ZERO } => {}
-                Emitter::Constant { radiance } => this.lights.push(Light::Environment(Environment::Constant(*radiance))),
-                Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Directional { .. } => {
-                    this.lights.push(Light::Delta(index));
+                Emitter::Constant { radiance } => this.environments.push(Environment::Constant(*radiance)),
+                Emitter::Directional { .. } => this.suns.push(i as u32),
+                Emitter::Point { position, intensity } => {
+                    bounds.push(delta_bounds(*position, *intensity, Vec3::Z, PI, PI));
+                    this.near.push(Near::Delta(i as u32));
+                }
+                Emitter::Spot { position, direction, intensity, cutoff_rad, .. } => {
+                    bounds.push(delta_bounds(*position, *intensity, *direction, 0.0, *cutoff_rad));
+                    this.near.push(Near::Delta(i as u32));
                 }
             }
         }
+        this.tree = LightTree::new(&bounds);
         this
     }
 
     /// Whether nothing emits.
     pub fn is_empty(&self) -> bool {
-        self.lights.is_empty()
+        self.shares() == 0
     }
 
-    /// Draws an emitter and a direction to it from `p`. `u` chooses the emitter, `v` the point. Visibility is the caller's.
-    pub fn sample(&self, scene: &Scene, p: Vec3, u: f32, v: Vec2) -> Option<LightSample> {
-        let count = self.lights.len();
-        let light = self.lights.get(((u * count as f32) as usize).min(count.saturating_sub(1)))?;
-        match light {
-            Light::Area { emitter, triangles } => self.sample_area(scene, p, *emitter, triangles, v),
-            Light::Environment(environment) => {
-                let (wi, mut pdf, mut radiance) = environment.sample(v);
-                if self.environments().nth(1).is_some() {
-                    (pdf, radiance) = (self.environments().map(|e| e.pdf(wi)).sum(), self.environment(wi));
-                }
-                pdf *= self.choice_pdf();
-                let weight = radiance / pdf;
-                let sample = LightSample { wi, distance: f32::INFINITY, point: Vec3::ZERO, weight, pdf, delta: false };
-                (pdf > 0.0).then_some(sample)
-            }
-            Light::Delta(emitter) => {
-                let mut sample = sample_delta(&scene.emitters[*emitter as usize], p)?;
-                sample.weight *= count as f32;
+    /// Emitters at infinity, and one for all the others.
+    fn shares(&self) -> usize {
+        self.environments.len() + self.suns.len() + usize::from(!self.tree.is_empty())
+    }
+
+    fn share(&self) -> f32 {
+        1.0 / self.shares().max(1) as f32
+    }
+
+    /// Draws an emitter and a direction to it. `u` chooses the emitter, `v` the point. Visibility is the caller's.
+    pub fn sample(&self, scene: &Scene, receiver: &Receiver, u: f32, v: Vec2) -> Option<LightSample> {
+        let shares = self.shares();
+        let place = u * shares as f32;
+        let choice = (place as usize).min(shares.checked_sub(1)?);
+        if choice < self.environments.len() {
+            return self.sample_environment(choice, v);
+        }
+        if let Some(&sun) = self.suns.get(choice - self.environments.len()) {
+            let mut sample = sample_delta(&scene.emitters[sun as usize], receiver.p)?;
+            sample.weight *= shares as f32;
+            return Some(sample);
+        }
+        let rest = (place - choice as f32).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
+        let (index, probability) = self.tree.sample(receiver, rest)?;
+        let probability = probability / shares as f32;
+        match &self.near[index as usize] {
+            Near::Triangle(triangle) => triangle.sample(scene, receiver.p, probability, v),
+            Near::Delta(emitter) => {
+                let mut sample = sample_delta(&scene.emitters[*emitter as usize], receiver.p)?;
+                sample.weight /= probability;
                 Some(sample)
             }
         }
     }
 
-    fn sample_area(&self, scene: &Scene, p: Vec3, emitter: u32, triangles: &Steps, v: Vec2) -> Option<LightSample> {
-        let Emitter::Area { object, radiance } = &scene.emitters[emitter as usize] else { return None };
-        let (geometry, object) = (&scene.geometry, &scene.geometry.objects[*object as usize]);
-        let (step, rest) = triangles.pick(v.x);
-        let triangle = object.triangles.start + step as u32;
-        let root = (1.0 - rest).sqrt();
-        let [b, c] = [root * v.y, 1.0 - root];
-        let a = 1.0 - b - c;
-
-        let corners = geometry.corners(triangle);
-        let point = corners[0] * a + corners[1] * b + corners[2] * c;
-        let (to_light, normal) = (point - p, geometry.area_normal(triangle).try_normalize()?);
-        let distance = to_light.length();
-        let wi = to_light.try_normalize()?;
-        let indices = geometry.triangles[triangle as usize].map(|i| i as usize);
-        let front = if object.face_normals {
-            normal
-        } else {
-            let [n0, n1, n2] = indices.map(|i| geometry.normals[i]);
-            n0 * a + n1 * b + n2 * c
-        };
-        let cos = normal.dot(wi).abs();
-        if front.dot(wi) >= 0.0 || cos == 0.0 {
-            return None;
+    fn sample_environment(&self, index: usize, v: Vec2) -> Option<LightSample> {
+        let (wi, mut pdf, mut radiance) = self.environments[index].sample(v);
+        if self.environments.len() > 1 {
+            (pdf, radiance) = (self.environments.iter().map(|e| e.pdf(wi)).sum(), self.environment(wi));
         }
-        let uv = if object.has_uvs {
-            let [t0, t1, t2] = indices.map(|i| geometry.uvs[i]);
-            t0 * a + t1 * b + t2 * c
-        } else {
-            Vec2::new(b, c)
-        };
-        let pdf = self.choice_pdf() * self.pdf_area[emitter as usize] * distance * distance / cos;
-        Some(LightSample { wi, distance, point, weight: radiance.eval(uv) / pdf, pdf, delta: false })
+        pdf *= self.share();
+        let sample = LightSample { wi, distance: f32::INFINITY, point: Vec3::ZERO, weight: radiance / pdf, pdf, delta: false };
+        (pdf > 0.0).then_some(sample)
     }
 
-    /// Density with which [`Lights::sample`] from `p` finds the emitting point `s`.
-    pub fn pdf_surface(&self, p: Vec3, s: &Surface) -> f32 {
-        let Some(pdf_area) = s.emitter.and_then(|e| self.pdf_area.get(e as usize)) else { return 0.0 };
-        let to_light = s.p - p;
+    /// Density with which [`Lights::sample`] finds the emitting point `s`.
+    pub fn pdf_surface(&self, scene: &Scene, receiver: &Receiver, s: &Surface) -> f32 {
+        let Some(first) = s.emitter.and_then(|e| self.first.get(e as usize).copied().flatten()) else { return 0.0 };
+        let index = first + (s.triangle - scene.geometry.objects[s.object as usize].triangles.start);
+        let Some(Near::Triangle(triangle)) = self.near.get(index as usize) else { return 0.0 };
+        let to_light = s.p - receiver.p;
         let distance = to_light.length();
         let cos = s.ng.dot(to_light).abs() / distance;
-        if cos > 0.0 { self.choice_pdf() * pdf_area * distance * distance / cos } else { 0.0 }
+        if cos > 0.0 {
+            self.share() * self.tree.probability(receiver, index) * distance * distance / (triangle.area * cos)
+        } else {
+            0.0
+        }
     }
 
     /// Density with which [`Lights::sample`] finds the environment in direction `d`.
     pub fn pdf_environment(&self, d: Vec3) -> f32 {
-        self.choice_pdf() * self.environments().map(|e| e.pdf(d)).sum::<f32>()
+        self.share() * self.environments.iter().map(|e| e.pdf(d)).sum::<f32>()
     }
 
     /// Radiance of the environment from direction `d` (pointing away from the scene).
     pub fn environment(&self, d: Vec3) -> Rgb {
-        self.environments().map(|e| e.eval(d)).sum()
+        self.environments.iter().map(|e| e.eval(d)).sum()
     }
 
     /// Radiance that an emitting surface sends to the side of `w` (unit, away from the surface); zero from behind.
@@ -174,17 +192,74 @@ impl Lights {
             _ => Rgb::ZERO,
         }
     }
+}
 
-    fn environments(&self) -> impl Iterator<Item = &Environment> {
-        self.lights.iter().filter_map(|l| match l {
-            Light::Environment(e) => Some(e),
-            _ => None,
-        })
+impl LightTriangle {
+    fn new(geometry: &Geometry, index: u32, emitter: u32) -> Self {
+        let corners = geometry.corners(index);
+        let normal = unit_normal(corners).unwrap_or(Vec3::ZERO);
+        let area = 0.5 * geometry.area_normal(index).length();
+        Self { corners, normal, area, emitter, index }
     }
 
-    fn choice_pdf(&self) -> f32 {
-        1.0 / self.lights.len().max(1) as f32
+    /// `mean` is the mean luminance of the emitter.
+    fn bounds(&self, geometry: &Geometry, object: &Object, mean: f32) -> LightBounds {
+        let [a, b, c] = self.corners;
+        let normals = if object.face_normals {
+            [self.normal; 3]
+        } else {
+            geometry.triangles[self.index as usize].map(|i| geometry.normals[i as usize])
+        };
+        let axis = normals.iter().sum::<Vec3>().try_normalize();
+        let widest = axis.map_or(PI, |axis| normals.iter().map(|n| axis.angle_between(*n)).fold(0.0, f32::max));
+        // Normals between them lie in the same cone as long as that is narrower than a hemisphere.
+        let spread = if widest < FRAC_PI_2 { widest } else { PI };
+        LightBounds {
+            corners: [a.min(b).min(c), a.max(b).max(c)],
+            axis: axis.unwrap_or(Vec3::Z),
+            spread,
+            reach: FRAC_PI_2,
+            power: if self.normal == Vec3::ZERO { 0.0 } else { mean * self.area },
+        }
     }
+
+    /// `probability` is that of this triangle's choice.
+    fn sample(&self, scene: &Scene, p: Vec3, probability: f32, v: Vec2) -> Option<LightSample> {
+        let Emitter::Area { object, radiance } = &scene.emitters[self.emitter as usize] else { return None };
+        let root = (1.0 - v.x).sqrt();
+        let [b, c] = [root * v.y, 1.0 - root];
+        let a = 1.0 - b - c;
+        let point = self.corners[0] * a + self.corners[1] * b + self.corners[2] * c;
+        let to_light = point - p;
+        let distance = to_light.length();
+        let wi = to_light.try_normalize()?;
+        let (geometry, object) = (&scene.geometry, &scene.geometry.objects[*object as usize]);
+        let indices = || geometry.triangles[self.index as usize].map(|i| i as usize);
+        let front = if object.face_normals {
+            self.normal
+        } else {
+            let [n0, n1, n2] = indices().map(|i| geometry.normals[i]);
+            n0 * a + n1 * b + n2 * c
+        };
+        let cos = self.normal.dot(wi).abs();
+        if front.dot(wi) >= 0.0 || cos == 0.0 {
+            return None;
+        }
+        let radiance = match radiance {
+            Texture::Constant(radiance) => *radiance,
+            texture if object.has_uvs => {
+                let [t0, t1, t2] = indices().map(|i| geometry.uvs[i]);
+                texture.eval(t0 * a + t1 * b + t2 * c)
+            }
+            texture => texture.eval(Vec2::new(b, c)),
+        };
+        let pdf = probability * distance * distance / (self.area * cos);
+        Some(LightSample { wi, distance, point, weight: radiance / pdf, pdf, delta: false })
+    }
+}
+
+fn delta_bounds(position: Vec3, intensity: Rgb, axis: Vec3, spread: f32, reach: f32) -> LightBounds {
+    LightBounds { corners: [position; 2], axis, spread, reach, power: luminance(intensity) }
 }
 
 impl Environment {
@@ -259,6 +334,11 @@ mod tests {
     use crate::scene::{Geometry, Object};
     use crate::transport::Sampler;
 
+    /// A point in space.
+    fn at(p: impl Into<Vec3>) -> Receiver {
+        Receiver { p: p.into(), n: Vec3::ZERO }
+    }
+
     fn scene(emitters: Vec<Emitter>) -> Scene {
         Scene { emitters, ..Scene::default() }
     }
@@ -300,11 +380,11 @@ mod tests {
         let s = scene(vec![spot]);
         let lights = Lights::new(&s);
         for (p, red) in [([1.0, 0.0, 0.5], 0.487_804_9), ([0.0, 0.0, 0.0], 0.555_555_6), ([-0.5, 0.5, 0.0], 0.463_948_55)] {
-            let sample = lights.sample(&s, p.into(), 0.5, Vec2::splat(0.5)).unwrap();
+            let sample = lights.sample(&s, &at(p), 0.5, Vec2::splat(0.5)).unwrap();
             assert!((sample.weight.x - red).abs() < 1e-5, "{p:?}: {} where Mitsuba has {red}", sample.weight.x);
             assert!((sample.weight.z - red * 0.6).abs() < 1e-5 && sample.delta && sample.pdf == 1.0);
         }
-        assert!(lights.sample(&s, Vec3::new(-3.0, 0.0, 0.0), 0.5, Vec2::splat(0.5)).is_none(), "outside of the cone");
+        assert!(lights.sample(&s, &at([-3.0, 0.0, 0.0]), 0.5, Vec2::splat(0.5)).is_none(), "outside of the cone");
 
         let two = vec![
             Emitter::Point { position: Vec3::Y * 2.0, intensity: Rgb::splat(8.0) },
@@ -312,9 +392,9 @@ mod tests {
         ];
         let s = scene(two);
         let lights = Lights::new(&s);
-        let point = lights.sample(&s, Vec3::ZERO, 0.2, Vec2::ZERO).unwrap();
+        let point = lights.sample(&s, &at([0.0; 3]), 0.7, Vec2::ZERO).unwrap();
         assert_eq!((point.wi, point.distance, point.weight), (Vec3::Y, 2.0, Rgb::splat(2.0 * 8.0 / 4.0)));
-        let sun = lights.sample(&s, Vec3::ZERO, 0.7, Vec2::ZERO).unwrap();
+        let sun = lights.sample(&s, &at([0.0; 3]), 0.2, Vec2::ZERO).unwrap();
         assert_eq!((sun.wi, sun.distance, sun.weight), (Vec3::Y, f32::INFINITY, Rgb::splat(2.0 * 7.0)));
     }
 
@@ -324,13 +404,17 @@ mod tests {
         let s = lamp(1.5, vec![]);
         let lights = Lights::new(&s);
         let p = Vec3::new(0.3, 0.0, -0.2);
-        let sum: Rgb = (0..N).map(|i| lights.sample(&s, p, 0.0, Sampler::new(1, i).next_2d()).unwrap().weight / N as f32).sum();
+        let weight = |i| {
+            let [u, x, y, _] = Sampler::new(1, i).next_4d();
+            lights.sample(&s, &at(p), u, Vec2::new(x, y)).unwrap().weight
+        };
+        let sum: Rgb = (0..N).map(|i| weight(i) / N as f32).sum();
         // Solid angle of a rectangle, corner by corner: atan(a b / (h sqrt(a² + b² + h²))).
         let corner = |a: f32, b: f32| (a * b / (1.5 * (a * a + b * b + 1.5 * 1.5).sqrt())).atan();
         let solid_angle = corner(1.3, 1.8) + corner(0.7, 1.8) + corner(1.3, 2.2) + corner(0.7, 2.2);
         assert!((sum / Rgb::new(1.0, 2.0, 3.0) / solid_angle - 1.0).abs().max_element() < 2e-3, "{sum}, {solid_angle} sr");
         let above = Vec3::new(0.0, 3.0, 0.0);
-        assert!(lights.sample(&s, above, 0.0, Vec2::splat(0.4)).is_none(), "dark from behind");
+        assert!(lights.sample(&s, &at(above), 0.0, Vec2::splat(0.4)).is_none(), "dark from behind");
     }
 
     #[test]
@@ -339,8 +423,11 @@ mod tests {
         let lights = Lights::new(&s);
         let p = Vec3::new(-0.6, 0.1, 0.4);
         for i in 0..64 {
-            let v = Sampler::new(2, i).next_2d();
-            let sample = lights.sample(&s, p, 0.25, v).unwrap();
+            let [u, x, y, _] = Sampler::new(2, i).next_4d();
+            let v = Vec2::new(x, y);
+            let receiver = Receiver { p, n: if i % 2 == 0 { Vec3::Y } else { Vec3::ZERO } };
+            let sample = lights.sample(&s, &receiver, 0.5 + 0.5 * u, v).unwrap();
+            let triangle = if sample.point.x > sample.point.z / 2.0 { 0 } else { 1 };
             let found = Surface {
                 p: sample.point,
                 ng: Vec3::NEG_Y,
@@ -349,17 +436,17 @@ mod tests {
                 dp_du: Vec3::ZERO,
                 dp_dv: Vec3::ZERO,
                 t: sample.distance,
-                triangle: 0,
+                triangle,
                 barycentric: Vec2::ZERO,
                 object: 0,
                 material: 0,
                 emitter: Some(0),
                 offset: 0.0,
             };
-            assert!((lights.pdf_surface(p, &found) / sample.pdf - 1.0).abs() < 1e-4);
+            assert!((lights.pdf_surface(&s, &receiver, &found) / sample.pdf - 1.0).abs() < 1e-4);
             assert_eq!(lights.emitted(&s, &found, -sample.wi), Rgb::new(1.0, 2.0, 3.0));
             assert_eq!(lights.emitted(&s, &found, sample.wi), Rgb::ZERO);
-            let sky = lights.sample(&s, p, 0.75, v).unwrap();
+            let sky = lights.sample(&s, &receiver, 0.25, v).unwrap();
             assert!((sky.pdf - 0.5 * 0.25 / PI).abs() < 1e-6 && (sky.pdf - lights.pdf_environment(sky.wi)).abs() < 1e-7);
         }
     }
@@ -368,6 +455,6 @@ mod tests {
     fn a_scene_without_light_gives_no_sample() {
         let s = scene(vec![]);
         assert!(Lights::new(&s).is_empty());
-        assert!(Lights::new(&s).sample(&s, Vec3::ZERO, 0.5, Vec2::ZERO).is_none());
+        assert!(Lights::new(&s).sample(&s, &at([0.0; 3]), 0.5, Vec2::ZERO).is_none());
     }
 }

@@ -3,6 +3,7 @@
 pub mod bsdf;
 pub mod bvh;
 pub mod envmap;
+pub mod light_tree;
 pub mod lights;
 pub mod path;
 pub mod sampler;

@@ -6,6 +6,7 @@
 //! weight out, so that a weak lobe's layer is as well sampled as a strong one's.
 
 use super::bsdf::{Bsdf, BsdfSample, Lobes, Query};
+use super::light_tree::Receiver;
 use super::lights::LightSample;
 use super::{Ray, Sampler, Surface, World};
 use crate::math::Rgb;
@@ -102,7 +103,8 @@ pub fn transmitted_irradiance(world: &World, surface: &Surface, back: bool, para
 
 /// Radiance arriving from the far end of `ray`, emission included, without a split.
 pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Rgb {
-    let start = Start { ray: *ray, pdf: 1.0, delta: true, eta: 1.0, depth: 0 };
+    let from = Receiver { p: ray.o, n: Vec3::ZERO };
+    let start = Start { ray: *ray, from, pdf: 1.0, delta: true, eta: 1.0, depth: 0 };
     keep_finite(incident(world, start, None, params, sampler))
 }
 
@@ -143,6 +145,8 @@ struct Vertex<'a> {
 #[derive(Clone, Copy)]
 struct Start {
     ray: Ray,
+    /// For whom the emitter sample that competes with it was drawn.
+    from: Receiver,
     /// Density with which `ray.d` was drawn at `ray.o`.
     pdf: f32,
     /// No emitter sample competes with it.
@@ -163,7 +167,8 @@ fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, 
     let mut sum = vertex.direct(light_choice, Vec2::new(light_x, light_y));
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
         let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
-        let start = Start { ray, pdf: sample.pdf, delta: sample.delta, eta: sample.eta, depth: 1 };
+        let from = vertex.receiver();
+        let start = Start { ray, from, pdf: sample.pdf, delta: sample.delta, eta: sample.eta, depth: 1 };
         sum += sample.weight * incident(vertex.world, start, known, params, sampler);
     }
     keep_finite(sum)
@@ -171,7 +176,7 @@ fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, 
 
 /// Radiance along a ray: emission weighted against the emitter sampling at its origin, and all that is scattered on.
 fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &PathParams, sampler: &mut Sampler) -> Rgb {
-    let Start { mut ray, mut pdf, mut delta, mut eta, mut depth } = start;
+    let Start { mut ray, mut from, mut pdf, mut delta, mut eta, mut depth } = start;
     let mut sum = Rgb::ZERO;
     let mut throughput = Rgb::ONE;
     loop {
@@ -186,7 +191,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
         let wo = -ray.d;
         if surface.emitter.is_some() {
             let light = world.lights.emitted(&world.scene, &surface, wo);
-            let other = if delta { 0.0 } else { world.lights.pdf_surface(ray.o, &surface) };
+            let other = if delta { 0.0 } else { world.lights.pdf_surface(&world.scene, &from, &surface) };
             sum += throughput * light * power_heuristic(pdf, other);
         }
         if depth >= params.max_depth {
@@ -216,7 +221,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
             }
             throughput /= survival;
         }
-        (pdf, delta) = (sample.pdf, sample.delta);
+        (from, pdf, delta) = (vertex.receiver(), sample.pdf, sample.delta);
         ray = surface.spawn(surface.frame.to_world(sample.wo));
     }
 }
@@ -226,10 +231,20 @@ impl Vertex<'_> {
         &self.world.scene.materials[self.surface.material as usize].bsdf
     }
 
+    /// Where the emitters are seen from.
+    fn receiver(&self) -> Receiver {
+        let side = match self.measure {
+            Measure::Scattering { .. } if self.bsdf().is_transmissive() => 0.0,
+            Measure::Scattering { wi, .. } => 1f32.copysign(wi.z),
+            Measure::Irradiance { side } => side,
+        };
+        Receiver { p: self.surface.p, n: self.surface.frame.n * side }
+    }
+
     /// Next-event estimation: light straight from an emitter, weighted against finding it by [`Vertex::sample`].
     fn direct(&self, choice: f32, v: Vec2) -> Rgb {
         let world = self.world;
-        let Some(light) = world.lights.sample(&world.scene, self.surface.p, choice, v) else { return Rgb::ZERO };
+        let Some(light) = world.lights.sample(&world.scene, &self.receiver(), choice, v) else { return Rgb::ZERO };
         let wo = self.surface.frame.to_local(light.wi);
         let (value, pdf) = self.eval_pdf(wo);
         if value == Rgb::ZERO || light.weight == Rgb::ZERO || world.occluded(&self.shadow_ray(&light)) {

@@ -9,7 +9,7 @@ use clap::ValueEnum;
 use reprobe::io::{ExrImage, Provenance, atomic};
 use reprobe::progress::Progress;
 use reprobe::render::aov::with_first_hits;
-use reprobe::render::path_trace::{PathTraceParams, path_trace};
+use reprobe::render::path_trace::{PathTraceParams, path_trace, path_trace_full};
 use reprobe::scene::{Camera, Scene};
 use reprobe::transport::World;
 use reprobe::transport::path::PathParams;
@@ -43,6 +43,9 @@ pub struct Args {
     /// Auxiliary layers: the first hit's, and the buffers of glossy-probes' passes
     #[arg(long, value_enum, value_name = "LAYERS")]
     pub aov: Option<Aov>,
+    /// path-trace: what to write
+    #[arg(long, value_enum, default_value = "all")]
+    layers: LayerChoice,
     /// Only these frames of the path
     #[arg(long, value_name = "LIST", value_parser = parse_frames)]
     frames: Option<FrameList>,
@@ -78,6 +81,15 @@ enum Method {
 pub enum Aov {
     /// depth, normal, position, material, albedo, alpha
     All,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+enum LayerChoice {
+    /// The image and its layers: emission, diffuse, glossy; a path each for the latter two
+    All,
+    /// The image alone, one path a sample
+    Full,
 }
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
@@ -117,20 +129,25 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
         let mut times = FrameTimings { name: format!("{frame:04}.exr"), ..FrameTimings::default() };
         let path = args.output.join(&times.name);
         let parameters = json!({
-            "method": timings.method, "frame": frame, "path_trace": params, "aov": args.aov.is_some(), "camera": describe(camera),
+            "method": timings.method, "frame": frame, "path_trace": params, "layers": args.layers, "aov": args.aov.is_some(), "camera": describe(camera),
         });
         let provenance = Provenance::new("render-path", &world.scene.hash, common.seed, &parameters);
         if is_finished(&path, &provenance) {
             times.kept = true;
             bar.advance(u64::from(camera.size[1]));
         } else {
-            let layers = times.pass("path_trace", || path_trace(&world, camera, &params, common.seed, *frame, &bar));
-            let mut image = ExrImage::new(camera.size[0] as usize, camera.size[1] as usize)
-                .with_rgb("", &layers.full())
-                .with_rgb("emission", &layers.emission)
-                .with_rgb("diffuse", &layers.diffuse)
-                .with_rgb("glossy", &layers.glossy)
-                .with_provenance(provenance);
+            let image = ExrImage::new(camera.size[0] as usize, camera.size[1] as usize).with_provenance(provenance);
+            let mut image = times.pass("path_trace", || match args.layers {
+                LayerChoice::Full => image.with_rgb("", &path_trace_full(&world, camera, &params, common.seed, *frame, &bar)),
+                LayerChoice::All => {
+                    let layers = path_trace(&world, camera, &params, common.seed, *frame, &bar);
+                    image
+                        .with_rgb("", &layers.full())
+                        .with_rgb("emission", &layers.emission)
+                        .with_rgb("diffuse", &layers.diffuse)
+                        .with_rgb("glossy", &layers.glossy)
+                }
+            });
             if args.aov.is_some() {
                 image = times.pass("aov", || with_first_hits(image, &world, camera));
             }
