@@ -1,21 +1,24 @@
-//! Rays a second: `cargo bench --bench rays -- FOLDER...`, each folder with the OBJ files of a scene.
+//! Rays a second: `cargo bench --bench rays -- [--write FOLDER] SCENE...`.
 //!
-//! The rays are those of paths: from the middle of the scene in all directions, then four cosine-distributed bounces,
-//! shuffled. Without a folder it says so and ends.
+//! The rays are those of paths: through the pixels of the scene's sensor, then cosine-distributed bounces; and from each hit
+//! one to a random point of the scene's emitters, or to another hit where there is none, for any hit. All are shuffled. With
+//! --write they and the triangles go to FOLDER, for `scripts/bench_vs_embree.py`. Without a scene it says so and ends.
 
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use reprobe::math::{Frame, direction_from_lat_long, hash_words};
-use reprobe::scene::{Scene, shapes};
-use reprobe::transport::bvh::Bvh;
-use reprobe::transport::{Ray, Surface};
+use reprobe::math::{Frame, hash_words, unit};
+use reprobe::scene::Scene;
+use reprobe::transport::light_tree::Receiver;
+use reprobe::transport::{Ray, World};
+use std::path::Path;
 use std::time::Instant;
 
-const PATHS: u32 = 50_000;
+const PATHS: u32 = 200_000;
 const BOUNCES: u32 = 5;
+const RUNS: usize = 3;
 
 fn uniform(words: &[u32]) -> f32 {
-    (hash_words(words) >> 8) as f32 / 16_777_216.0
+    unit(hash_words(words))
 }
 
 /// Time this thread has computed: says the same on a busy machine. Wall time where the system does not tell.
@@ -27,51 +30,33 @@ fn cpu_seconds() -> f64 {
     nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |n| n * 1e-9)
 }
 
-fn load(folder: &str) -> Scene {
-    let mut files: Vec<_> = std::fs::read_dir(folder)
-        .expect("a folder")
-        .map(|e| e.expect("an entry").path())
-        .filter(|p| p.extension().is_some_and(|e| e == "obj"))
-        .collect();
-    files.sort();
-    let meshes: Vec<_> = files.par_iter().map(|f| shapes::obj::load(f).expect("an OBJ file")).collect();
-    let mut scene = Scene::default();
-    for mesh in meshes {
-        shapes::append(&mut scene.geometry, mesh, Mat4::IDENTITY, false, false, String::new(), 0, None);
-    }
-    scene
-}
-
-/// Rays of paths, shuffled.
-fn rays(scene: &Scene, bvh: &Bvh) -> Vec<Ray> {
-    let (lo, hi) = scene.geometry.bounds();
-    let paths: Vec<Vec<Ray>> = (0..PATHS)
-        .into_par_iter()
-        .map(|path| {
-            let u = |k: u32| uniform(&[path, k]);
-            let d = direction_from_lat_long(Vec2::new(u(0), (1.0 - 2.0 * u(1)).acos() / std::f32::consts::PI));
-            let mut ray = Ray::new((lo + hi) / 2.0 + (Vec3::new(u(2), u(3), u(4)) - 0.5) * (hi - lo) * 0.2, d);
-            let mut out = Vec::new();
-            for bounce in 0..BOUNCES {
-                out.push(ray);
-                let Some(hit) = bvh.closest(scene, &ray) else { break };
-                let s = Surface::new(scene, &hit);
-                let n = s.ng * -ray.d.dot(s.ng).signum();
-                let (r, phi) = (u(5 + 2 * bounce).sqrt(), u(6 + 2 * bounce) * std::f32::consts::TAU);
-                let local = Vec3::new(r * phi.cos(), r * phi.sin(), (1.0 - r * r).max(0.0).sqrt());
-                ray = s.spawn(Frame::from_normal(n).to_world(local).normalize());
+/// Rays of paths, and shadow rays, each shuffled.
+fn rays(world: &World) -> [Vec<Ray>; 2] {
+    let camera = world.scene.sensor.as_ref().expect("a sensor");
+    let path = |path: u32| {
+        let u = |k: u32| uniform(&[path, k]);
+        let [width, height] = camera.size.map(|s| s as f32);
+        let mut ray = camera.ray(Vec2::new(u(0) * width, u(1) * height), Vec2::ZERO);
+        let (mut out, mut shadow) = (Vec::new(), Vec::new());
+        for bounce in 0..BOUNCES {
+            out.push(ray);
+            let Some(s) = world.intersect(&ray) else { break };
+            let n = s.ng * -ray.d.dot(s.ng).signum();
+            let k = 8 + 8 * bounce;
+            if let Some(l) = world.lights.sample(&world.scene, &Receiver { p: s.p, n }, u(k), Vec2::new(u(k + 1), u(k + 2))) {
+                shadow.push(if l.distance.is_finite() { s.spawn_to(l.point) } else { s.spawn(l.wi) });
             }
-            out
-        })
-        .collect();
-    let mut rays = paths.concat();
-    let mut order: Vec<u32> = (0..rays.len() as u32).collect();
-    order.sort_by_key(|&i| hash_words(&[i, 9]));
-    let unshuffled = rays.clone();
-    for (ray, &i) in rays.iter_mut().zip(&order) {
-        *ray = unshuffled[i as usize];
-    }
-    rays
+            let (r, phi) = (u(k + 3).sqrt(), u(k + 4) * std::f32::consts::TAU);
+            let local = Vec3::new(r * phi.cos(), r * phi.sin(), (1.0 - r * r).max(0.0).sqrt());
+            ray = s.spawn(Frame::from_normal(n).to_world(local).normalize());
+        }
+        (out, shadow)
+    };
+    let (closest, any): (Vec<_>, Vec<_>) = (0..PATHS).into_par_iter().map(path).unzip();
+    [closest.concat(), any.concat()].map(|mut rays| {
+        rays.sort_by_cached_key(|r| hash_words(&[r.o.x, r.o.y, r.o.z, r.d.x, r.d.y, r.d.z].map(f32::to_bits)));
+        rays
+    })
 }
 
 /// obvhs's binary tree with its own triangle test, to compare with.
@@ -108,35 +93,69 @@ impl Obvhs {
     }
 }
 
+/// Triangles, rays, hits and rates as plain little-endian arrays.
+fn write(folder: &Path, world: &World, [closest, any]: &[Vec<Ray>; 2], rates: [f64; 2]) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let geometry = &world.scene.geometry;
+    let corners: Vec<[Vec3; 3]> = (0..geometry.triangles.len() as u32).map(|t| geometry.corners(t)).collect();
+    let numbers = |rays: &[Ray]| -> Vec<[f32; 8]> {
+        rays.iter().map(|r| [r.o.x, r.o.y, r.o.z, r.d.x, r.d.y, r.d.z, r.t_min, r.t_max]).collect()
+    };
+    let hits: Vec<[f32; 2]> = closest
+        .iter()
+        .map(|r| world.closest(r).map_or([f32::from_bits(u32::MAX), f32::INFINITY], |h| [f32::from_bits(h.triangle), h.t]))
+        .collect();
+    let blocked: Vec<u8> = any.iter().map(|r| u8::from(world.occluded(r))).collect();
+    std::fs::write(folder.join("triangles.f32"), bytemuck::cast_slice(&corners))?;
+    std::fs::write(folder.join("closest.f32"), bytemuck::cast_slice(&numbers(closest)))?;
+    std::fs::write(folder.join("any.f32"), bytemuck::cast_slice(&numbers(any)))?;
+    std::fs::write(folder.join("hits.f32"), bytemuck::cast_slice(&hits))?;
+    std::fs::write(folder.join("blocked.u8"), blocked)?;
+    std::fs::write(folder.join("rates.json"), serde_json::json!({ "closest": rates[0], "any": rates[1] }).to_string())
+}
+
 fn main() {
-    let folders: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    if folders.is_empty() {
-        println!("rays: no folder given, nothing measured");
+    let mut args = std::env::args().skip(1).filter(|a| a != "--bench").peekable();
+    let folder = args.next_if(|a| a == "--write").and_then(|_| args.next());
+    let scenes: Vec<String> = args.collect();
+    if scenes.is_empty() {
+        println!("rays: no scene given, nothing measured");
     }
-    for folder in folders {
-        let scene = load(&folder);
+    for path in scenes {
+        let scene = reprobe::scene::load(Path::new(&path), &Default::default()).expect("a scene");
         let start = Instant::now();
-        let bvh = Bvh::build(&scene, &|_| true);
+        let world = World::new(scene);
         let build = start.elapsed().as_secs_f64();
-        let rays = rays(&scene, &bvh);
-        let shadow: Vec<Ray> =
-            rays.iter().enumerate().map(|(i, r)| Ray { t_max: 0.2 + 3.0 * uniform(&[i as u32, 3]), ..*r }).collect();
-        let rate = |f: &dyn Fn() -> usize| {
-            let best = (0..3).map(|_| {
+        let rays = rays(&world);
+        let [closest, any] = &rays;
+        let rate = |n: usize, f: &dyn Fn() -> usize| {
+            let mut times = [(); RUNS].map(|()| {
                 let start = cpu_seconds();
                 std::hint::black_box(f());
                 cpu_seconds() - start
             });
-            rays.len() as f64 / 1e6 / best.fold(f64::INFINITY, f64::min)
+            times.sort_by(f64::total_cmp);
+            n as f64 / 1e6 / times[RUNS / 2]
         };
-        let closest = rate(&|| rays.iter().filter(|r| bvh.closest(&scene, r).is_some()).count());
-        let any = rate(&|| shadow.iter().filter(|r| bvh.occluded(&scene, r)).count());
-        let obvhs = Obvhs::new(&scene);
-        let obvhs_closest = rate(&|| rays.iter().filter(|r| obvhs.closest(r)).count());
-        let obvhs_any = rate(&|| shadow.iter().filter(|r| obvhs.occluded(r)).count());
+        let ours = [
+            rate(closest.len(), &|| closest.iter().filter(|r| world.closest(r).is_some()).count()),
+            rate(any.len(), &|| any.iter().filter(|r| world.occluded(r)).count()),
+        ];
+        let obvhs = Obvhs::new(&world.scene);
+        let theirs = [
+            rate(closest.len(), &|| closest.iter().filter(|r| obvhs.closest(r)).count()),
+            rate(any.len(), &|| any.iter().filter(|r| obvhs.occluded(r)).count()),
+        ];
         println!(
-            "{folder}: {} triangles built in {build:.2} s; closest {closest:.2}, any {any:.2} million rays a second and thread (obvhs {obvhs_closest:.2}, {obvhs_any:.2})",
-            scene.geometry.triangles.len()
+            "{path}: {} triangles, ready in {build:.2} s; million rays a second and thread: closest {:.2}, any {:.2} (obvhs {:.2}, {:.2})",
+            world.scene.geometry.triangles.len(),
+            ours[0],
+            ours[1],
+            theirs[0],
+            theirs[1]
         );
+        if let Some(folder) = &folder {
+            write(Path::new(folder), &world, &rays, ours).expect("the files to be written");
+        }
     }
 }

@@ -17,6 +17,13 @@ const BATCHES: u32 = 24;
 const SPP: u32 = 24;
 const REFERENCE_SPP: f64 = 16384.0;
 
+/// Variance of Mitsuba's samples over that of ours in the full image, measured with 12288 samples of ours; 1.5 in the layers.
+const REFERENCE_NOISIER: f64 = 7.0;
+
+/// Least and largest RMSE, in units of the noise. Few pixels with rare bright paths decide it: with ten other sets of seeds it
+/// was between 0.89 and 1.24.
+const NOISE_ALONE: std::ops::Range<f64> = 0.8..1.3;
+
 /// A layer's difference to the reference.
 struct Deviation {
     /// RMSE over the RMSE that the noise of both renders should give.
@@ -35,7 +42,7 @@ fn deviation(batches: &[Vec<Rgb>], reference: &[Rgb]) -> Deviation {
         let values: Vec<f64> = batches.iter().map(|b| grey(b[i])).collect();
         let found = values.iter().sum::<f64>() / n;
         let sample_variance = values.iter().map(|v| (v - found).powi(2)).sum::<f64>() / (n - 1.0);
-        variance += sample_variance * (1.0 / n + f64::from(SPP) / REFERENCE_SPP);
+        variance += sample_variance * (1.0 / n + REFERENCE_NOISIER * f64::from(SPP) / REFERENCE_SPP);
         difference += found - grey(expected);
         square += (found - grey(expected)).powi(2);
         total += grey(expected);
@@ -61,7 +68,7 @@ fn a_room_has_mitsubas_light_in_every_layer() {
         let found: Vec<Vec<Rgb>> = batches.iter().map(pick).collect();
         let Deviation { rmse_ratio, mean, mean_noise } = deviation(&found, &reference.rgb(&path, layer).unwrap());
         println!("layer \"{layer}\": RMSE {rmse_ratio:.3} of its noise, mean {mean:+.4} ± {mean_noise:.4}");
-        assert!((0.8..1.1).contains(&rmse_ratio), "layer \"{layer}\": RMSE {rmse_ratio} of what noise explains");
+        assert!(NOISE_ALONE.contains(&rmse_ratio), "layer \"{layer}\": RMSE {rmse_ratio} of what noise explains");
         assert!(mean_noise < 0.01 && mean.abs() < 3.0 * mean_noise, "layer \"{layer}\": mean {mean:+} ± {mean_noise}");
     }
 }

@@ -189,7 +189,7 @@ fn neither_a_dark_void_nor_a_bright_yard_leaks_under_a_wall() {
     for outside in [None, Some(100.0)] {
         let world = room_with_a_floor_that_goes_on(outside);
         // Texel borders lie at multiples of 0.1: the texel of the wall is lit for three tenths.
-        let map = bake(&world, &params(0.1, 64));
+        let map = bake(&world, &params(0.1, 256));
         let (mut found, mut exact) = (0.0, 0.0);
         for i in 0..10 {
             let p = Vec3::new(1.005, 0.1, -0.9 + 0.2 * i as f32);

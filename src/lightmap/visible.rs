@@ -49,7 +49,7 @@ impl Visibility<'_> {
     /// The surface at a sample point.
     pub fn surface(&self, point: Point) -> Surface {
         let hit = Hit { t: 0.0, triangle: point.triangle, u: point.barycentric.x, v: point.barycentric.y };
-        Surface::new(&self.world.scene, &hit)
+        self.world.surface(&hit)
     }
 
     /// The surface at `u` in [0, 1)² of a texel's covered part.

@@ -321,12 +321,12 @@ fn fetch(w: &WeightedProbe, at: Vec2, rule: BilinearRule) -> Rgb {
 /// Directional albedo of the non-diffuse lobe in the view over that at the probe's sample, both at the probes' roughness:
 /// carries Fresnel and the specular texture over from one to the other. Clamped, as a ratio of small numbers says little.
 fn albedo_ratio(world: &World, pixel: &Pixel, probe: &Probe, texel: &Texel, roughness_scale: f32) -> Rgb {
+    use crate::transport::Hit;
     use crate::transport::bsdf::{Lobes, Query};
-    use crate::transport::{Hit, Surface};
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
     let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
     let b = texel.barycentric();
-    let there = Surface::new(&world.scene, &Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
+    let there = world.surface(&Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
     let Some(wo) = (probe.position - there.p).try_normalize() else { return Rgb::ONE };
     let view = bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query);
     let probe = bsdf.glossy_albedo(&there, there.frame.to_local(wo), query);

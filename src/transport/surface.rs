@@ -2,8 +2,10 @@
 
 use super::{Hit, Ray};
 use crate::math::Frame;
-use crate::scene::{Geometry, Scene};
+use crate::scene::Geometry;
+use crate::scene::shapes::normals::unit_normal;
 use glam::{Vec2, Vec3};
+use std::num::NonZeroU32;
 
 /// Half an ulp of 1: the relative rounding error of one operation.
 const EPSILON: f32 = f32::EPSILON / 2.0;
@@ -56,54 +58,80 @@ pub fn uv_at(geometry: &Geometry, hit: &Hit) -> Vec2 {
     a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
 }
 
-impl Surface {
-    /// The surface that `hit` lies on.
-    pub fn new(scene: &Scene, hit: &Hit) -> Self {
-        let geometry = &scene.geometry;
-        let object_index = geometry.triangle_object[hit.triangle as usize];
+/// All of a triangle that a [`Surface`] is made of, in two lines of the cache: rays without order wait for memory, and the
+/// scene's own arrays would make them wait for ten.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(128))]
+pub struct Facet {
+    corners: [Vec3; 3],
+    /// Unit shading normals of the corners; `ng` thrice for face normals.
+    normals: [Vec3; 3],
+    uvs: [Vec2; 3],
+    ng: Vec3,
+    object: u32,
+    material: u32,
+    emitter: Option<NonZeroU32>,
+    /// Largest coordinate of the corners; negative where the object has no texture coordinates.
+    extent: f32,
+}
+
+impl Facet {
+    /// The facet of a triangle.
+    pub fn new(geometry: &Geometry, triangle: u32) -> Self {
+        let object_index = geometry.triangle_object[triangle as usize];
         let object = &geometry.objects[object_index as usize];
-        let vertices = geometry.triangles[hit.triangle as usize].map(|i| i as usize);
-        let [a, b, c] = vertices.map(|i| geometry.positions[i]);
+        let vertices = geometry.triangles[triangle as usize].map(|i| i as usize);
+        let corners = geometry.corners(triangle);
+        let ng = unit_normal(corners).unwrap_or(Vec3::Z);
+        let extent = corners.iter().fold(0f32, |m, p| m.max(p.abs().max_element()));
+        Self {
+            corners,
+            normals: if object.face_normals { [ng; 3] } else { vertices.map(|i| geometry.normals[i]) },
+            uvs: vertices.map(|i| geometry.uvs[i]),
+            ng,
+            object: object_index,
+            material: object.material,
+            emitter: object.emitter.and_then(|e| NonZeroU32::new(e + 1)),
+            extent: if object.has_uvs { extent } else { -extent },
+        }
+    }
+
+    /// The surface that `hit`, of this triangle, lies on.
+    pub fn surface(&self, hit: &Hit) -> Surface {
+        let [a, b, c] = self.corners;
+        let ([na, nb, nc], [ta, tb, tc]) = (self.normals, self.uvs);
         let w = 1.0 - hit.u - hit.v;
         let p = a * w + b * hit.u + c * hit.v;
-        let (e, f) = (b - a, c - a);
-        let ng = crate::scene::shapes::normals::unit_normal([a, b, c]).unwrap_or(Vec3::Z);
-
-        let n = if object.face_normals {
-            ng
-        } else {
-            let [na, nb, nc] = vertices.map(|i| geometry.normals[i]);
-            (na * w + nb * hit.u + nc * hit.v).try_normalize().unwrap_or(ng)
-        };
-        let fallback = Frame::from_normal(ng);
-        let (mut dp_du, mut dp_dv) = (fallback.s, fallback.t);
-        if object.has_uvs {
-            let [ta, tb, tc] = vertices.map(|i| geometry.uvs[i]);
-            let (g, h) = (tb - ta, tc - ta);
+        let n = (na * w + nb * hit.u + nc * hit.v).try_normalize().unwrap_or(self.ng);
+        let tangents = || {
+            let ((e, f), (g, h)) = ((b - a, c - a), (tb - ta, tc - ta));
             let inv = 1.0 / g.perp_dot(h);
-            if inv.is_finite() {
-                dp_du = (e * h.y - f * g.y) * inv;
-                dp_dv = (f * g.x - e * h.x) * inv;
-            }
-        }
-        let corner = a.abs().max(b.abs()).max(c.abs()).max_element();
-        Self {
+            inv.is_finite().then(|| ((e * h.y - f * g.y) * inv, (f * g.x - e * h.x) * inv))
+        };
+        let has_uvs = self.extent.is_sign_positive();
+        let (dp_du, dp_dv) = has_uvs.then(tangents).flatten().unwrap_or_else(|| {
+            let frame = Frame::from_normal(self.ng);
+            (frame.s, frame.t)
+        });
+        Surface {
             p,
-            ng,
+            ng: self.ng,
             frame: Frame::from_normal_and_tangent(n, dp_du),
-            uv: uv_at(geometry, hit),
+            uv: if has_uvs { ta * w + tb * hit.u + tc * hit.v } else { Vec2::new(hit.u, hit.v) },
             dp_du,
             dp_dv,
             t: hit.t,
             triangle: hit.triangle,
             barycentric: Vec2::new(hit.u, hit.v),
-            object: object_index,
-            material: object.material,
-            emitter: object.emitter,
-            offset: EPSILON * (OFFSET_ULPS.0 * p.abs().max_element()).max(OFFSET_ULPS.1 * corner),
+            object: self.object,
+            material: self.material,
+            emitter: self.emitter.map(|e| e.get() - 1),
+            offset: EPSILON * (OFFSET_ULPS.0 * p.abs().max_element()).max(OFFSET_ULPS.1 * self.extent.abs()),
         }
     }
+}
 
+impl Surface {
     /// The point just off the surface on the side of `d`.
     fn origin(&self, d: Vec3) -> Vec3 {
         self.p + self.ng * self.offset.copysign(self.ng.dot(d))
@@ -126,9 +154,14 @@ impl Surface {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
     use crate::scene::shapes::{self, Mesh};
     use crate::transport::bvh::Bvh;
     use glam::Mat4;
+
+    fn surface(scene: &Scene, hit: &Hit) -> Surface {
+        Facet::new(&scene.geometry, hit.triangle).surface(hit)
+    }
 
     /// A quad from (0, 0) to (1, 1) with skewed texture coordinates, as Mitsuba reads it from an OBJ.
     fn quad(normals: bool, m: Mat4, flip: bool) -> Scene {
@@ -163,7 +196,7 @@ mod tests {
             let x = if m == mirror { -1.0 } else { 1.0 };
             let ray = Ray::new(Vec3::new(0.3 * x, 0.2, 5.0), Vec3::NEG_Z);
             let hit = Bvh::build(&scene, &|_| true).closest(&scene, &ray).unwrap();
-            let found = Surface::new(&scene, &hit);
+            let found = surface(&scene, &hit);
             let near = |a: Vec3, b: [f32; 3]| (a - Vec3::from(b)).length() < 1e-5;
             assert!(near(found.frame.n, n) && near(found.frame.s, s) && near(found.frame.t, t), "{:?}", found.frame);
             assert!(near(found.ng, n) && near(found.p, [0.3 * x, 0.2, 0.0]) && (found.t - 5.0).abs() < 1e-6);
@@ -177,7 +210,7 @@ mod tests {
     fn without_texture_coordinates_the_barycentrics_stand_in() {
         let mut scene = quad(true, Mat4::IDENTITY, false);
         scene.geometry.objects[0].has_uvs = false;
-        let found = Surface::new(&scene, &Hit { t: 1.0, triangle: 1, u: 0.25, v: 0.5 });
+        let found = surface(&scene, &Hit { t: 1.0, triangle: 1, u: 0.25, v: 0.5 });
         assert_eq!(found.uv, Vec2::new(0.25, 0.5));
         assert!((found.dp_du.cross(found.dp_dv) - found.ng).length() < 1e-6);
     }
@@ -198,7 +231,7 @@ mod tests {
                 let d = crate::math::direction_from_lat_long(Vec2::new(u, v));
                 let o = centre - d * (3.0 * radius) + Vec3::new(v, u, 0.5) * radius * 0.3;
                 let Some(hit) = bvh.closest(&scene, &Ray::new(o, d)) else { continue };
-                let s = Surface::new(&scene, &hit);
+                let s = surface(&scene, &hit);
                 seen += 1;
                 // Outwards, at any angle, nothing more is met; inwards, the far side.
                 let out = (s.ng + Vec3::new(u - 0.5, v - 0.5, 0.1) * 1.9).normalize();
@@ -206,7 +239,7 @@ mod tests {
                     assert!(!bvh.occluded(&scene, &s.spawn(out)), "{s:?}");
                 }
                 let far = bvh.closest(&scene, &s.spawn(d)).unwrap_or_else(|| panic!("no far side of {s:?}"));
-                let far = Surface::new(&scene, &far);
+                let far = surface(&scene, &far);
                 if d.dot(far.ng) > 0.02 && far.p.distance(s.p) > 0.02 * radius {
                     assert!(!bvh.occluded(&scene, &s.spawn_to(far.p)), "{s:?} to {far:?}");
                     assert!(!bvh.occluded(&scene, &far.spawn_to(s.p)), "{far:?} to {s:?}");

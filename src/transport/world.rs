@@ -2,8 +2,10 @@
 
 use super::bvh::Bvh;
 use super::lights::Lights;
+use super::surface::Facet;
 use super::{Hit, Ray, Surface};
 use crate::scene::Scene;
+use rayon::prelude::*;
 
 /// Scene, BVH and emitter distributions: what every ray-tracing stage takes.
 pub struct World {
@@ -13,6 +15,7 @@ pub struct World {
     pub bvh: Bvh,
     /// Its emitters, ready for sampling.
     pub lights: Lights,
+    facets: Vec<Facet>,
 }
 
 impl World {
@@ -31,7 +34,9 @@ impl World {
     fn with_filter(scene: Scene, keep: impl Fn(&Scene, u32) -> bool) -> Self {
         let bvh = Bvh::build(&scene, &|t| keep(&scene, t));
         let lights = Lights::new(&scene);
-        Self { scene, bvh, lights }
+        let count = scene.geometry.triangles.len() as u32;
+        let facets = (0..count).into_par_iter().map(|t| Facet::new(&scene.geometry, t)).collect();
+        Self { scene, bvh, lights, facets }
     }
 
     /// First hit of a ray.
@@ -41,7 +46,12 @@ impl World {
 
     /// First surface along a ray.
     pub fn intersect(&self, ray: &Ray) -> Option<Surface> {
-        self.closest(ray).map(|hit| Surface::new(&self.scene, &hit))
+        self.closest(ray).map(|hit| self.surface(&hit))
+    }
+
+    /// The surface that a hit lies on.
+    pub fn surface(&self, hit: &Hit) -> Surface {
+        self.facets[hit.triangle as usize].surface(hit)
     }
 
     /// Whether something blocks a ray.

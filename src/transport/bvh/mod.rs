@@ -7,6 +7,7 @@
 //! below that opacity. Repeating a ray repeats its answer, and the mean over many rays is the opacity. The two faces of a thin
 //! sheet (a blind, a leaf) count once, as in Mitsuba, which steps over the second: see [`SHEET`].
 
+mod cut;
 mod simd;
 #[cfg(test)]
 mod tests;
@@ -21,17 +22,18 @@ use crate::scene::shapes::normals::unit_normal;
 use crate::scene::{Geometry, Scene};
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer};
+use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 #[cfg(target_arch = "x86_64")]
-use simd::Avx2;
+use simd::{Avx2, Avx512};
 use simd::{Portable, Simd};
+use std::cell::RefCell;
 use traverse::STACK;
 use wide::Tree;
 
 /// Boxes are larger than their triangles by this much of the scene's largest coordinate: more than what rounding can move a
 /// hit, so that the tree finds whatever testing every triangle would.
-const BOX_MARGIN: f32 = 8.0 * f32::EPSILON;
+const BOX_MARGIN: f32 = 16.0 * f32::EPSILON;
 
 /// Hits of one object in one interval of this length along a ray share their hash, times (1 + largest coordinate of its origin).
 /// Sixteen times Mitsuba's step off a surface, so that few sheets thinner than that step straddle two intervals.
@@ -40,6 +42,8 @@ const SHEET: f32 = 16.0 * 1500.0 * 0.5 * f32::EPSILON;
 /// Acceleration structure over the triangles of a scene (all, or the opaque ones only).
 pub struct Bvh {
     tree: Tree,
+    #[cfg(target_arch = "x86_64")]
+    lanes: Lanes,
 }
 
 impl Bvh {
@@ -51,16 +55,23 @@ impl Bvh {
         let kept: Vec<u32> = (0..count).filter(|&t| keep(t) && has_area(t)).collect();
         let has_opacity: Vec<bool> = scene.materials.iter().map(|m| m.opacity.is_some()).collect();
         let masked = |t| has_opacity.get(geometry.object(t).material as usize).copied().unwrap_or(false);
-        Self { tree: Tree::new(&binary_tree(geometry, &kept), &kept, geometry, &masked) }
+        let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
+        Self {
+            tree: Tree::new(&binary_tree(geometry, &kept, extent * BOX_MARGIN), &kept, geometry, &masked),
+            #[cfg(target_arch = "x86_64")]
+            lanes: Lanes::detect(),
+        }
     }
 
     /// First hit in [t_min, t_max]. Alpha-masked triangles are passed where a hash of ray and triangle says so.
     pub fn closest(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
         let passes = &mut |hit: &Hit| passes(scene, ray, hit);
         #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = Avx2::detect() {
-            // SAFETY: the machine has AVX2.
-            return unsafe { closest_avx2(avx2, &self.tree, ray, passes) };
+        match self.lanes {
+            // SAFETY: the machine has what the value stands for.
+            Lanes::Avx512(s) => return unsafe { closest_avx512(s, &self.tree, ray, passes) },
+            Lanes::Avx2(s) => return unsafe { closest_avx2(s, &self.tree, ray, passes) },
+            Lanes::Portable => {}
         }
         closest_with(Portable, &self.tree, ray, passes)
     }
@@ -69,18 +80,37 @@ impl Bvh {
     pub fn occluded(&self, scene: &Scene, ray: &Ray) -> bool {
         let passes = &mut |hit: &Hit| passes(scene, ray, hit);
         #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = Avx2::detect() {
-            // SAFETY: the machine has AVX2.
-            return unsafe { any_avx2(avx2, &self.tree, ray, passes) };
+        match self.lanes {
+            // SAFETY: the machine has what the value stands for.
+            Lanes::Avx512(s) => return unsafe { any_avx512(s, &self.tree, ray, passes) },
+            Lanes::Avx2(s) => return unsafe { any_avx2(s, &self.tree, ray, passes) },
+            Lanes::Portable => {}
         }
         any_with(Portable, &self.tree, ray, passes)
     }
 }
 
-/// obvhs's medium build, spelled out: its own function checks the tree for seconds in builds with debug assertions.
-fn binary_tree(geometry: &Geometry, kept: &[u32]) -> Bvh2 {
-    let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
-    let margin = Vec3A::splat(extent * BOX_MARGIN);
+/// Forms of the traversal that the machine may have.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+enum Lanes {
+    Avx512(Avx512),
+    Avx2(Avx2),
+    Portable,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes {
+    fn detect() -> Self {
+        let avx2 = || Avx2::detect().map_or(Self::Portable, Self::Avx2);
+        Avx512::detect().map_or_else(avx2, Self::Avx512)
+    }
+}
+
+/// obvhs's medium build up to its leaves, spelled out: its own function checks the tree for seconds in builds with debug
+/// assertions.
+fn binary_tree(geometry: &Geometry, kept: &[u32], margin: f32) -> Bvh2 {
+    let margin = Vec3A::splat(margin);
     let boxes: Vec<Aabb> = kept
         .iter()
         .map(|&t| Aabb::from_points(&geometry.corners(t).map(|p| p.to_vec3a())))
@@ -90,16 +120,19 @@ fn binary_tree(geometry: &Geometry, kept: &[u32]) -> Bvh2 {
     let mut tree =
         PlocBuilder::with_capacity(boxes.len()).build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
     let mut optimizer = ReinsertionOptimizer::default();
-    optimizer.run(&mut tree, 0.05, None);
-    collapse(&mut tree, 8, 8.0);
     optimizer.run(&mut tree, 0.1, None);
     tree
+}
+
+thread_local! {
+    /// Kept from ray to ray: clearing a kilobyte is a twentieth of a ray's time.
+    static STACKS: RefCell<([f32; STACK], [u32; STACK])> = const { RefCell::new(([0.0; STACK], [0; STACK])) };
 }
 
 #[inline(always)]
 fn closest_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
     if tree.stack <= STACK {
-        traverse::closest(s, tree, ray, (&mut [0.0; STACK], &mut [0; STACK]), passes)
+        STACKS.with_borrow_mut(|(entries, ids)| traverse::closest(s, tree, ray, (entries, ids), passes))
     } else {
         traverse::closest(s, tree, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
     }
@@ -108,21 +141,33 @@ fn closest_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&H
 #[inline(always)]
 fn any_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
     if tree.stack <= STACK {
-        traverse::any(s, tree, ray, &mut [0; STACK], passes)
+        STACKS.with_borrow_mut(|(_, ids)| traverse::any(s, tree, ray, ids, passes))
     } else {
         traverse::any(s, tree, ray, &mut vec![0; tree.stack], passes)
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn closest_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
     closest_with(s, tree, ray, passes)
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn any_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
+    any_with(s, tree, ray, passes)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+fn closest_avx512(s: Avx512, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
+    closest_with(s, tree, ray, passes)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+fn any_avx512(s: Avx512, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
     any_with(s, tree, ray, passes)
 }
 

@@ -232,11 +232,11 @@ fn a_thin_sheet_counts_once_and_two_sheets_twice() {
 
 #[cfg(target_arch = "x86_64")]
 #[test]
-fn avx2_and_portable_answer_bit_for_bit() {
-    let Some(avx2) = Avx2::detect() else {
-        println!("skipped: no AVX2 here");
-        return;
-    };
+fn all_forms_answer_bit_for_bit() {
+    let (avx2, avx512) = (Avx2::detect(), Avx512::detect());
+    if avx512.is_none() {
+        println!("skipped: no AVX-512 here");
+    }
     let mut random = Random(5);
     let mut scene = scene_of(soup(1200, &mut random), Mat4::IDENTITY);
     shapes::append(&mut scene.geometry, primitives::sphere(Vec3::X, 0.4), Mat4::IDENTITY, false, false, String::new(), 0, None);
@@ -246,13 +246,22 @@ fn avx2_and_portable_answer_bit_for_bit() {
         let ray = ray_of(i, &scene.geometry, 1.0, &mut random);
         // A mask that waves through every third triangle, to see that both are asked about the same ones.
         let pass = |hit: &Hit| hit.triangle.is_multiple_of(3);
-        // SAFETY: `avx2` was detected.
-        let (a, any_a) =
-            unsafe { (closest_avx2(avx2, &bvh.tree, &ray, &mut |h| pass(h)), any_avx2(avx2, &bvh.tree, &ray, &mut |h| pass(h))) };
-        let b = closest_with(Portable, &bvh.tree, &ray, &mut |h| pass(h));
         let bits = |h: Option<Hit>| h.map(|h| (h.t.to_bits(), h.triangle, h.u.to_bits(), h.v.to_bits()));
-        assert_eq!(bits(a), bits(b), "ray {i}");
-        assert_eq!(any_a, any_with(Portable, &bvh.tree, &ray, &mut |h| pass(h)));
+        let a = closest_with(Portable, &bvh.tree, &ray, &mut |h| pass(h));
+        let any = any_with(Portable, &bvh.tree, &ray, &mut |h| pass(h));
+        if let Some(s) = avx2 {
+            // SAFETY: it was detected.
+            let (b, any_b) =
+                unsafe { (closest_avx2(s, &bvh.tree, &ray, &mut |h| pass(h)), any_avx2(s, &bvh.tree, &ray, &mut |h| pass(h))) };
+            assert_eq!((bits(a), any), (bits(b), any_b), "AVX2, ray {i}");
+        }
+        if let Some(s) = avx512 {
+            // SAFETY: it was detected.
+            let (b, any_b) = unsafe {
+                (closest_avx512(s, &bvh.tree, &ray, &mut |h| pass(h)), any_avx512(s, &bvh.tree, &ray, &mut |h| pass(h)))
+            };
+            assert_eq!((bits(a), any), (bits(b), any_b), "AVX-512, ray {i}");
+        }
         hits += u32::from(a.is_some());
     }
     assert!((2000..6000).contains(&hits), "{hits}");

@@ -5,7 +5,7 @@ use super::triangle::Shear;
 use super::wide::{Block, MARK, Node, Tree};
 use super::{Hit, Ray};
 
-/// Distances to the far sides of boxes grow by this much against rounding: 4 ulp, where the slab test can lose 3 (Ize 2013).
+/// Distances to the far sides of boxes grow by this much against rounding: 4 ulp, where the slab test can lose 3 (compare Ize 2013).
 const FAR_SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
 
 /// Directions closer to zero than this count as this, so that no slab is 0 times infinity.
@@ -19,10 +19,9 @@ pub const STACK: usize = 128;
 
 /// A ray made ready for boxes and triangles.
 struct Prepared<S: Simd> {
-    origin: [S::F; 3],
     inverse: [S::F; 3],
-    /// `inverse` with [`FAR_SLACK`], for the sides through which a ray leaves.
-    inverse_far: [S::F; 3],
+    /// Origin times `inverse`.
+    start: [S::F; 3],
     /// Which of `Node::bounds` a ray enters through, for each axis; it leaves through the others.
     near: [usize; 3],
     order: S::I,
@@ -40,9 +39,8 @@ impl<S: Simd> Prepared<S> {
         let inverse = d.map(|x| 1.0 / if x.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(x) } else { x });
         let shear = Shear::new(ray);
         Self {
-            origin: splat3(s, ray.o.into()),
             inverse: splat3(s, inverse),
-            inverse_far: splat3(s, [inverse[0] * FAR_SLACK, inverse[1] * FAR_SLACK, inverse[2] * FAR_SLACK]),
+            start: splat3(s, [ray.o.x * inverse[0], ray.o.y * inverse[1], ray.o.z * inverse[2]]),
             near: [0, 1, 2].map(|k| if negative[k] { k + 3 } else { k }),
             order: s.octant_order(u32::from(negative[0]) | u32::from(negative[1]) << 1 | u32::from(negative[2]) << 2),
             t_min: s.splat(ray.t_min),
@@ -52,24 +50,22 @@ impl<S: Simd> Prepared<S> {
         }
     }
 
-    /// Distance to each child's near side across axis `k`.
+    /// Distance to side `side` of each child's box, across axis `k`. The rounding of `start` moves a side by half an ulp of
+    /// the origin's coordinate. Up to sixteen times the scene's extent, boxes are wider by more; beyond, the distance itself
+    /// is so large that it is within [`FAR_SLACK`].
     #[inline(always)]
-    fn near(&self, s: S, node: &Node, k: usize) -> S::F {
-        s.mul(s.sub(s.load(&node.bounds[self.near[k]]), self.origin[k]), self.inverse[k])
+    fn side(&self, s: S, node: &Node, side: usize, k: usize) -> S::F {
+        s.mul_sub(s.load(&node.bounds[side]), self.inverse[k], self.start[k])
     }
 
-    /// Distance to each child's far side across axis `k`: lower and upper bounds lie three apart.
-    #[inline(always)]
-    fn far(&self, s: S, node: &Node, k: usize) -> S::F {
-        s.mul(s.sub(s.load(&node.bounds[2 * k + 3 - self.near[k]]), self.origin[k]), self.inverse_far[k])
-    }
-
-    /// Where the ray enters and leaves each child's box. Rounding aside: boxes are wider than what they hold.
+    /// Where the ray enters and leaves each child's box. Lower and upper bounds lie three apart.
     #[inline(always)]
     fn slabs(&self, s: S, node: &Node, t_max: S::F) -> (S::F, S::F) {
-        let enter = s.max(s.max(self.near(s, node, 0), self.near(s, node, 1)), s.max(self.near(s, node, 2), self.t_min));
-        let leave = s.min(s.min(self.far(s, node, 0), self.far(s, node, 1)), s.min(self.far(s, node, 2), t_max));
-        (enter, leave)
+        let [x, y, z] = self.near;
+        let (nx, ny, nz) = (self.side(s, node, x, 0), self.side(s, node, y, 1), self.side(s, node, z, 2));
+        let (fx, fy, fz) = (self.side(s, node, 3 - x, 0), self.side(s, node, 5 - y, 1), self.side(s, node, 7 - z, 2));
+        let leave = s.mul(s.min(s.min(fx, fy), fz), s.splat(FAR_SLACK));
+        (s.max(s.max(nx, ny), s.max(nz, self.t_min)), s.min(leave, t_max))
     }
 
     /// The corners `k` of eight triangles, sheared.
@@ -131,9 +127,8 @@ pub fn closest<S: Simd>(
             let node = &tree.nodes[id as usize];
             let (enter, leave) = r.slabs(s, node, s.splat(nearest));
             let mask = s.le_permuted(enter, leave, r.order);
-            let pack = s.compress(mask);
-            let children = s.permute_ids(s.permute_ids(s.load_ids(&node.children), r.order), pack);
-            let enter = s.permute(s.permute(enter, r.order), pack);
+            let children = s.pack_ids(s.permute_ids(s.load_ids(&node.children), r.order), mask);
+            let enter = s.pack(s.permute(enter, r.order), mask);
             s.store(enter, entries[top..].first_chunk_mut().expect("room for eight"));
             s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
             let end = top + mask.count_ones() as usize;
@@ -176,7 +171,7 @@ pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut 
             let node = &tree.nodes[id as usize];
             let (enter, leave) = r.slabs(s, node, t_max);
             let mask = s.le(enter, leave);
-            let children = s.permute_ids(s.load_ids(&node.children), s.compress(mask));
+            let children = s.pack_ids(s.load_ids(&node.children), mask);
             s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
             let end = top + mask.count_ones() as usize;
             prefetch(s, tree, &ids[top..end]);

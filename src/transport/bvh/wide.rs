@@ -1,9 +1,10 @@
-//! The eight-wide tree: obvhs's binary tree with the inner nodes of largest area opened until each node has eight children.
+//! The eight-wide tree, cut out of obvhs's binary tree: see [`super::cut`].
 //!
 //! Ours. Children take the slot of the octant they lie in, seen from the node's middle, so that a ray finds near children
 //! first by visiting slots in the order slot xor (signs of its direction), without sorting (Garanzha and Loop 2010, Ylitie
 //! et al. 2017).
 
+use super::cut::Cut;
 use crate::scene::Geometry;
 use obvhs::bvh2::Bvh2;
 
@@ -49,10 +50,10 @@ impl Tree {
         if kept.is_empty() {
             return tree;
         }
-        let block = |first: u32, count: u32| {
+        let block = |primitives: &[u32]| {
             let mut block = Block { corners: [[[f32::NAN; 8]; 3]; 3], ids: [0; 8] };
-            for (lane, i) in (first..first + count).enumerate() {
-                let triangle = kept[binary.primitive_indices[i as usize] as usize];
+            for (lane, &i) in primitives.iter().enumerate() {
+                let triangle = kept[i as usize];
                 block.ids[lane] = triangle | if masked(triangle) { MARK } else { 0 };
                 for (corner, p) in geometry.corners(triangle).into_iter().enumerate() {
                     for axis in 0..3 {
@@ -62,9 +63,9 @@ impl Tree {
             }
             block
         };
-        let root = &binary.nodes[0];
-        if root.is_leaf() {
-            tree.blocks.push(block(root.first_index, root.prim_count));
+        let cut = Cut::new(binary);
+        if cut.is_leaf(0) {
+            tree.blocks.push(block(&cut.primitives(0)));
             tree.root = Some(MARK);
             return tree;
         }
@@ -75,15 +76,15 @@ impl Tree {
         while let Some((from, to, depth)) = todo.pop() {
             // A visit takes its own entry off the stack and puts at most eight on.
             tree.stack = tree.stack.max(7 * depth + 8);
-            for (slot, child) in slots(binary, from, &open(binary, from)).into_iter().enumerate() {
+            for (slot, child) in slots(binary, from, &cut.children(from)).into_iter().enumerate() {
                 let Some(child) = child else { continue };
-                let node = &binary.nodes[child as usize];
+                let bounds = &binary.nodes[child as usize].aabb;
                 for axis in 0..3 {
-                    tree.nodes[to].bounds[axis][slot] = node.aabb.min[axis];
-                    tree.nodes[to].bounds[axis + 3][slot] = node.aabb.max[axis];
+                    tree.nodes[to].bounds[axis][slot] = bounds.min[axis];
+                    tree.nodes[to].bounds[axis + 3][slot] = bounds.max[axis];
                 }
-                tree.nodes[to].children[slot] = if node.is_leaf() {
-                    tree.blocks.push(block(node.first_index, node.prim_count));
+                tree.nodes[to].children[slot] = if cut.is_leaf(child) {
+                    tree.blocks.push(block(&cut.primitives(child)));
                     (tree.blocks.len() - 1) as u32 | MARK
                 } else {
                     tree.nodes.push(Node::EMPTY);
@@ -101,22 +102,6 @@ impl Node {
         let (low, high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
         Self { bounds: [low, low, low, high, high, high], children: [0; 8] }
     };
-}
-
-/// Up to eight descendants of an inner node that together hold what it holds.
-fn open(binary: &Bvh2, node: u32) -> Vec<u32> {
-    let first = binary.nodes[node as usize].first_index;
-    let mut children = Vec::with_capacity(8);
-    children.extend([first, first + 1]);
-    while children.len() < 8 {
-        let area = |i: &u32| binary.nodes[*i as usize].aabb.half_area();
-        let inner = (0..children.len()).filter(|&k| !binary.nodes[children[k] as usize].is_leaf());
-        let Some(widest) = inner.max_by(|&j, &k| area(&children[j]).total_cmp(&area(&children[k]))) else { break };
-        let first = binary.nodes[children[widest] as usize].first_index;
-        children[widest] = first;
-        children.push(first + 1);
-    }
-    children
 }
 
 /// Children in the slots of their octants: greedily, whichever child lies farthest out towards a free slot's corner.
