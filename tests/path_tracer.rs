@@ -119,7 +119,8 @@ fn known_diffuse_light_stands_in_for_the_paths_that_would_find_it() {
     let surface = world.intersect(&ray).unwrap();
     let known = |s: &Surface, _: Vec3| if s.object == walls { glow * 0.6 / (1.0 - 0.6) } else { Rgb::ZERO };
     let query = Query { lobes: Lobes::NON_DIFFUSE, ..Query::default() };
-    let found = scattered(&world, &surface, -ray.d, query, Some(&known), &PathParams::default(), &mut Sampler::new(1, 1));
+    let no_roulette = PathParams { rr_depth: u32::MAX, ..PathParams::default() };
+    let found = scattered(&world, &surface, -ray.d, query, Some(&known), &no_roulette, &mut Sampler::new(1, 1));
     assert!((found - glow / (1.0 - 0.6)).abs().max_element() < 1e-5, "{found}");
     estimate(8192, 21, |s| scattered(&world, &surface, -ray.d, query, None, &PathParams::default(), s)).assert_is(found, 0.01);
 }

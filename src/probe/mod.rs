@@ -6,6 +6,7 @@
 //! them or those that [`wanted`] names; [`store`] reads a folder of them. [`set`] marks a folder of probe files as complete.
 
 pub mod bake;
+mod cholesky;
 pub mod dct;
 pub mod file;
 pub mod lattice;

@@ -17,10 +17,10 @@
 //! convex one (Gortler, Gotsman and Thurston 2006), so no quad flips but by rounding; that is checked, and answered by a
 //! larger epsilon. "Solve iteratively" needs no more than one solve here: C does not depend on f.
 
+use super::cholesky::Cholesky;
 use super::qhmap::count_flipped;
 use crate::{Error, Result};
 use glam::Vec2;
-use nalgebra_sparse::factorization::{CscCholesky, CscSymbolicCholesky};
 use nalgebra_sparse::pattern::SparsityPattern;
 
 /// Regions of at most this many vertices are not dissected further.
@@ -33,8 +33,8 @@ pub struct Solver {
     unknown: Vec<u32>,
     /// What each stored matrix entry holds, column after column.
     entries: Vec<Entry>,
-    symbolic: CscSymbolicCholesky,
-    factor: Option<CscCholesky<f64>>,
+    pattern: SparsityPattern,
+    cholesky: Cholesky,
 }
 
 #[derive(Clone, Copy)]
@@ -91,7 +91,7 @@ impl Solver {
         let n = order.len();
         let pattern = SparsityPattern::try_from_offsets_and_indices(n, n, offsets, rows)
             .map_err(|e| Error::Request(format!("matrix of the quasi-harmonic map: {e}")))?;
-        Ok(Self { mesh, unknown, entries, symbolic: CscSymbolicCholesky::factor(pattern), factor: None })
+        Ok(Self { mesh, unknown, entries, cholesky: Cholesky::new(&pattern), pattern })
     }
 
     /// Quads of the mesh in u and v: the resolution map's size.
@@ -149,20 +149,15 @@ impl Solver {
                 Entry::Down(v) => -weights.down[v as usize],
             })
             .collect();
-        let singular = |_| Error::Request("the quasi-harmonic map's matrix is not positive definite".into());
-        let factor = match &mut self.factor {
-            Some(factor) => {
-                factor.refactor(&values).map_err(singular)?;
-                factor
-            }
-            none => none.insert(CscCholesky::factor_numerical(self.symbolic.clone(), &values).map_err(singular)?),
-        };
-        let mut x = nalgebra_sparse::na::DMatrix::zeros(self.unknown.len(), 1);
+        if !self.cholesky.factor(&self.pattern, &values) {
+            return Err(Error::Request("the quasi-harmonic map's matrix is not positive definite".into()));
+        }
+        let mut x = vec![0.0; self.unknown.len()];
         for (v, &i) in self.unknown.iter().enumerate() {
             let v = v as u32;
             x[i as usize] = if pinned(v) { 0.0 } else { weights.force(v, axis) };
         }
-        factor.solve_mut(&mut x);
+        self.cholesky.solve(&mut x);
         let mut d: Vec<f64> = self.unknown.iter().map(|&i| x[i as usize]).collect();
         if axis == Axis::U {
             let mean = d.iter().sum::<f64>() / d.len() as f64;
