@@ -67,6 +67,11 @@ pub fn floor(x: f32) -> i64 {
     i.saturating_sub(i64::from(i as f32 > x))
 }
 
+/// What [`floor`] leaves of each coordinate, in [0, 1].
+pub fn fraction(p: Vec2) -> Vec2 {
+    p - Vec2::new(floor(p.x) as f32, floor(p.y) as f32)
+}
+
 /// World direction of a lat-long coordinate: `u` in [0, 1) is the longitude from -Z over +X,
 /// `v` in [0, 1] the polar angle from +Y (the convention of Mitsuba's `envmap`).
 /// Inverse of [`lat_long_from_direction`].

@@ -11,7 +11,7 @@
 use super::mesh_inverse;
 use super::quasi_harmonic::Solver;
 use crate::io::{ExrImage, Provenance};
-use crate::math::{direction_from_lat_long, lat_long_from_direction};
+use crate::math::{direction_from_lat_long, floor, lat_long_from_direction};
 use crate::{Error, Result};
 use glam::{IVec2, UVec2, Vec2, Vec3};
 use half::f16;
@@ -98,7 +98,7 @@ impl ParameterMap {
     /// Probe coordinate of a lat-long coordinate; u unwrapped. Bilinear within each quad of the mesh.
     pub fn forward_at(&self, lat_long: Vec2) -> Vec2 {
         let mesh = UVec2::from(self.mesh);
-        let turn = lat_long.x.floor();
+        let turn = floor(lat_long.x) as f32;
         let p = Vec2::new(lat_long.x - turn, lat_long.y.clamp(0.0, 1.0)) * mesh.as_vec2();
         let cell = p.as_uvec2().min(mesh - 1);
         let t = p - cell.as_vec2();
@@ -113,7 +113,7 @@ impl ParameterMap {
     pub fn texel_from_direction(&self, d: Vec3) -> Vec2 {
         let p = self.forward_at(lat_long_from_direction(d));
         let size = UVec2::from(self.size).as_vec2();
-        let x = (p.x - p.x.floor()) * size.x;
+        let x = (p.x - floor(p.x) as f32) * size.x;
         Vec2::new(if x < size.x { x } else { 0.0 }, p.y.clamp(0.0, 1.0) * size.y)
     }
 

@@ -93,7 +93,8 @@ pub fn wanted_texels(
         let view = gbuffer(world, curvature, &fine);
         let reflected = mirror_pass(world, &view);
         tiles(&view, &reflected).par_iter().for_each(|tile| {
-            for samples in best_samples(fine.position(), &reflected, tile, &weighted, &views.gather) {
+            for samples in best_samples(fine.position(), &reflected, (tile.as_slice(), view.size()[0]), &weighted, &views.gather)
+            {
                 for (w, sample) in weighted.iter().zip(samples) {
                     let Some(sample) = sample else { continue };
                     for texel in footprint_texels(w.probe, sample.texel) {

@@ -6,11 +6,12 @@ use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::scene::{Camera, Scene};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The last frame's view and glossy layer.
 pub struct Previous {
     /// Its camera, at the size of its buffers.
-    pub view: GBuffer,
+    pub view: Arc<GBuffer>,
     /// Its filtered glossy layer.
     pub glossy: Vec<Rgb>,
 }
@@ -57,6 +58,8 @@ pub fn downsample(fine: &[Rgb], size: [usize; 2], n: usize) -> Vec<Rgb> {
     let (width, height) = (size[0] / n, size[1] / n);
     let scale = 1.0 / (n * n) as f32;
     (0..width * height)
+        .into_par_iter()
+        .with_min_len(width)
         .map(|i| {
             let (x, y) = (i % width * n, i / width * n);
             let block = (0..n * n).map(|k| fine[(y + k / n) * size[0] + x + k % n]);

@@ -9,9 +9,10 @@ use super::candidates::Candidate;
 use super::gbuffer::{GBuffer, Pixel};
 use super::mirror::{NOTHING, Reflected};
 use super::perturb::{PerturbParams, Perturbation};
-use crate::math::{Rgb, floor};
+use crate::math::{Rgb, floor, fraction};
 use crate::probe::file::{Probe, Texel};
-use crate::transport::World;
+use crate::transport::bsdf::{Bsdf, Lobes, Query};
+use crate::transport::{Hit, World};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -45,6 +46,9 @@ pub struct GatherParams {
     /// The search, coarse to fine. *Paper* (§5.2): 7x7 at 4 texels, then 3x3 at 2 texels. *Ours*: then 3x3 at 1 texel, which finds
     /// thin reflectors.
     pub search: Vec<SearchLevel>,
+    /// Of the pixels, one in so many each way is searched for in full; those between begin where these ended, with the finest
+    /// level alone, unless that is much worse. *Paper*: 1, each. *Ours*: 4, a quarter of the time for the same error.
+    pub anchors: usize,
     /// s_a, the factor on the energy where the reflected materials differ. *Paper*: 10.
     pub material_penalty: f32,
     /// φ, the falloff of a sample's weight with its energy (Eq. 2). *Paper*: 8. *Ours*: 16.
@@ -65,6 +69,7 @@ impl Default for GatherParams {
         let finest = SearchLevel { radius: 1, step: 1.0 };
         Self {
             search: [paper.search, vec![finest]].concat(),
+            anchors: 4,
             falloff: 16.0,
             bilinear: BilinearRule::SameReflectorAndReflected,
             albedo_ratio: true,
@@ -79,6 +84,7 @@ impl GatherParams {
     pub fn paper() -> Self {
         Self {
             search: vec![SearchLevel { radius: 3, step: 4.0 }, SearchLevel { radius: 1, step: 2.0 }],
+            anchors: 1,
             material_penalty: 10.0,
             falloff: 8.0,
             probes: 8,
@@ -169,7 +175,7 @@ pub fn gather(
     let gathered: Vec<Vec<Gathered>> = tiles
         .par_iter()
         .map(|tile| {
-            let samples = best_samples(eye, reflected, tile, probes, params);
+            let samples = best_samples(eye, reflected, (tile.as_slice(), view.size()[0]), probes, params);
             let blended = tile.iter().zip(&samples).map(|((_, p), s)| blend(world, p, s, probes, roughness_scale, params));
             blended.collect()
         })
@@ -205,31 +211,84 @@ pub struct Sample {
     pub texel: Vec2,
 }
 
-/// The sample of least energy of each of `probes` (at most eight), for each pixel of one of [`tiles`], as `eye` sees it.
+/// How much worse than its anchor a pixel's sample may be before it is searched for in full: a factor, and an addend.
+const ANCHOR_TOLERANCE: (f32, f32) = (3.0, 0.1);
+
+/// The sample of least energy of each of `probes` (at most eight), for each pixel of one of [`tiles`], as `eye` sees it. `width`
+/// is the view's.
 pub fn best_samples(
     eye: Vec3,
     reflected: &[Reflected],
-    tile: &[(usize, &Pixel)],
+    (tile, width): (&[(usize, &Pixel)], usize),
     probes: &[WeightedProbe],
     params: &GatherParams,
 ) -> Vec<[Option<Sample>; 8]> {
-    let pixels: Vec<_> = tile
+    let targets: Vec<_> = tile
         .iter()
         .map(|&(i, pixel)| {
             let reflected = reflected[i];
             let (r, n) = (pixel.surface.p, pixel.normal);
             let at_view = Reflection { normal: n, direction: reflected.direction_from(r), reflected };
             let distance = reflected.distance_from(r);
-            (pixel.surface.material, at_view, Perturbation::new(eye, r, n, distance, &pixel.curvature, &params.perturb))
+            let path = Perturbation::new(eye, r, n, distance, &pixel.curvature, &params.perturb);
+            (Target { at_view, material: pixel.surface.material }, path)
         })
         .collect();
+    let step = params.anchors.max(1);
+    let place = |i: usize| [i % width, i / width];
+    let is_anchor = |i: usize| place(i).iter().all(|x| x.is_multiple_of(step));
     let mut samples = vec![[None; 8]; tile.len()];
+    // By place in the tile: where an anchor's search ended, from where it began.
+    let mut ends: Vec<Option<(Vec2, f32, u32)>> = vec![None; TILE * TILE];
     for (k, w) in probes.iter().enumerate() {
-        for (samples, (material, at_view, path)) in samples.iter_mut().zip(&pixels) {
-            samples[k] = search(w, path.reflection_point(w.probe.position), *material, at_view, params);
+        let begin = |path: &Perturbation| w.texel_towards(path.reflection_point(w.probe.position));
+        ends.fill(None);
+        for ((samples, (target, path)), &(i, _)) in samples.iter_mut().zip(&targets).zip(tile).filter(|(_, t)| is_anchor(t.0)) {
+            let Some(centre) = begin(path) else { continue };
+            samples[k] = search(w, centre, target, &params.search, None, params);
+            let [x, y] = place(i).map(|x| x % TILE);
+            ends[y * TILE + x] = samples[k].map(|s| (s.texel - centre, s.energy, target.material));
+        }
+        for ((samples, (target, path)), &(i, _)) in samples.iter_mut().zip(&targets).zip(tile).filter(|(_, t)| !is_anchor(t.0)) {
+            let Some(centre) = begin(path) else { continue };
+            let [x, y] = place(i).map(|x| x % TILE / step * step);
+            let around = [(0, 0), (step, 0), (0, step), (step, step)].into_iter().filter_map(|(dx, dy)| {
+                let inside = x + dx < TILE && y + dy < TILE;
+                inside.then(|| ends[(y + dy) * TILE + x + dx]).flatten().filter(|a| a.2 == target.material)
+            });
+            samples[k] = between_anchors(w, centre, target, around, params)
+                .or_else(|| search(w, centre, target, &params.search, None, params));
         }
     }
     samples
+}
+
+/// What a search looks for.
+struct Target {
+    at_view: Reflection,
+    material: u32,
+}
+
+/// The sample that the ends of the anchors `around` lead to; `None` where it is much worse than theirs, or there is none.
+fn between_anchors(
+    w: &WeightedProbe,
+    centre: Vec2,
+    target: &Target,
+    around: impl Iterator<Item = (Vec2, f32, u32)>,
+    params: &GatherParams,
+) -> Option<Sample> {
+    let mut start = None;
+    let (mut least, mut allowed) = (f32::INFINITY, 0f32);
+    for (end, energy, _) in around {
+        allowed = allowed.max(energy * ANCHOR_TOLERANCE.0 + ANCHOR_TOLERANCE.1);
+        let texel = centre + end;
+        if let Some(energy) = w.energy_below(least, texel, target, params) {
+            (least, start) = (energy, Some(Sample { energy, texel }));
+        }
+    }
+    let start = start?;
+    let finest = params.search.last().map(std::slice::from_ref)?;
+    search(w, start.texel, target, finest, Some(start), params).filter(|s| s.energy <= allowed)
 }
 
 /// Eq. 2.
@@ -247,11 +306,12 @@ fn blend(
     };
     // exp(-φ E_min) is cancelled against Z, so that it cannot underflow.
     let (mut sum, mut z) = (Rgb::ZERO, 0.0);
+    let ratio = params.albedo_ratio.then(|| AlbedoRatio::new(world, pixel, roughness_scale));
     for (w, sample) in found() {
         let weight = w.weight.max(MIN_TRILINEAR) * (-params.falloff * (sample.energy - best.energy)).exp();
         let mut color = fetch(w, sample.texel, params.bilinear);
-        if params.albedo_ratio {
-            color *= albedo_ratio(world, pixel, w.probe, w.probe.texel(sample.texel), roughness_scale);
+        if let Some(ratio) = &ratio {
+            color *= ratio.over(w.probe, w.probe.texel(sample.texel));
         }
         sum += color * weight;
         z += weight;
@@ -265,14 +325,33 @@ pub fn footprint_texels(probe: &Probe, at: Vec2) -> [usize; 4] {
     [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| probe.index(x + i, y + j))
 }
 
-/// The texel coordinate of least energy around the direction from the probe to `x`, coarse level first.
-/// Only texels whose reflector is of `material` count; `None` where there is none.
-fn search(w: &WeightedProbe, x: Vec3, material: u32, at_view: &Reflection, params: &GatherParams) -> Option<Sample> {
+impl WeightedProbe<'_> {
+    /// The texel coordinate at which the probe sees the point `x`.
+    fn texel_towards(&self, x: Vec3) -> Option<Vec2> {
+        (x - self.probe.position).try_normalize().map(|d| self.probe.map.texel_from_direction(d))
+    }
+
+    /// [`energy_below`] of the texel at `at`, whose reflector must be of the target's material.
+    fn energy_below(&self, limit: f32, at: Vec2, target: &Target, params: &GatherParams) -> Option<f32> {
+        let candidate = &self.candidates[self.probe.index_at(at)];
+        let same = candidate.material == target.material;
+        same.then(|| energy_below(limit, &target.at_view, &candidate.reflection, params.material_penalty)).flatten()
+    }
+}
+
+/// The texel coordinate of least energy around `centre`, coarse level first; `known` is a sample there.
+/// Only texels whose reflector is of the target's material count; `None` where there is none.
+fn search(
+    w: &WeightedProbe,
+    mut centre: Vec2,
+    target: &Target,
+    levels: &[SearchLevel],
+    known: Option<Sample>,
+    params: &GatherParams,
+) -> Option<Sample> {
     let probe = w.probe;
-    let direction = (x - probe.position).try_normalize()?;
-    let mut centre = probe.map.texel_from_direction(direction);
-    let (mut least, mut found) = (f32::INFINITY, centre);
-    for level in &params.search {
+    let (mut least, mut found) = known.map_or((f32::INFINITY, centre), |s| (s.energy, s.texel));
+    for level in levels {
         let step = probe.map.search_scale(centre) * level.step;
         for j in -level.radius..=level.radius {
             let y = centre.y + step.y * j as f32;
@@ -280,10 +359,10 @@ fn search(w: &WeightedProbe, x: Vec3, material: u32, at_view: &Reflection, param
             for i in -level.radius..=level.radius {
                 let x = centre.x + step.x * i as f32;
                 let candidate = &w.candidates[row + probe.column(floor(x))];
-                if candidate.material != material {
+                if candidate.material != target.material {
                     continue;
                 }
-                if let Some(energy) = energy_below(least, at_view, &candidate.reflection, params.material_penalty) {
+                if let Some(energy) = energy_below(least, &target.at_view, &candidate.reflection, params.material_penalty) {
                     least = energy;
                     found = Vec2::new(x, y);
                 }
@@ -303,7 +382,7 @@ fn fetch(w: &WeightedProbe, at: Vec2, rule: BilinearRule) -> Rgb {
         return w.probe.texel(at).glossy();
     }
     let centre = &w.candidates[w.probe.index_at(at)];
-    let f = (at - 0.5) - (at - 0.5).floor();
+    let f = fraction(at - 0.5);
     let (mut sum, mut total) = (Rgb::ZERO, 0.0);
     let weights = [(1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y];
     for (i, weight) in footprint_texels(w.probe, at).into_iter().zip(weights) {
@@ -318,17 +397,28 @@ fn fetch(w: &WeightedProbe, at: Vec2, rule: BilinearRule) -> Rgb {
     sum / total
 }
 
-/// Directional albedo of the non-diffuse lobe in the view over that at the probe's sample, both at the probes' roughness:
+/// Directional albedo of the non-diffuse lobe in the view over that at a probe's sample, both at the probes' roughness:
 /// carries Fresnel and the specular texture over from one to the other. Clamped, as a ratio of small numbers says little.
-fn albedo_ratio(world: &World, pixel: &Pixel, probe: &Probe, texel: &Texel, roughness_scale: f32) -> Rgb {
-    use crate::transport::Hit;
-    use crate::transport::bsdf::{Lobes, Query};
-    let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
-    let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
-    let b = texel.barycentric();
-    let there = world.surface(&Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
-    let Some(wo) = (probe.position - there.p).try_normalize() else { return Rgb::ONE };
-    let view = bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query);
-    let probe = bsdf.glossy_albedo(&there, there.frame.to_local(wo), query);
-    (view / probe.max(Rgb::splat(1e-4))).clamp(Rgb::splat(0.25), Rgb::splat(4.0))
+struct AlbedoRatio<'a> {
+    world: &'a World,
+    bsdf: &'a Bsdf,
+    query: Query,
+    view: Rgb,
+}
+
+impl<'a> AlbedoRatio<'a> {
+    fn new(world: &'a World, pixel: &Pixel, roughness_scale: f32) -> Self {
+        let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
+        let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
+        let view = bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query);
+        Self { world, bsdf, query, view }
+    }
+
+    fn over(&self, probe: &Probe, texel: &Texel) -> Rgb {
+        let b = texel.barycentric();
+        let there = self.world.surface(&Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
+        let Some(wo) = (probe.position - there.p).try_normalize() else { return Rgb::ONE };
+        let probe = self.bsdf.glossy_albedo(&there, there.frame.to_local(wo), self.query);
+        (self.view / probe.max(Rgb::splat(1e-4))).clamp(Rgb::splat(0.25), Rgb::splat(4.0))
+    }
 }

@@ -18,6 +18,7 @@ use crate::transport::World;
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// All parameters of the method at run time.
@@ -76,7 +77,7 @@ pub struct Frame {
 /// Per-sub-pixel buffers of a frame, at `supersample` times its size.
 pub struct Buffers {
     /// The G-buffer.
-    pub view: GBuffer,
+    pub view: Arc<GBuffer>,
     /// Mirror hits.
     pub reflected: Vec<Reflected>,
     /// Before the filter.
@@ -127,7 +128,7 @@ impl<'a> Renderer<'a> {
         let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
         let weighted = self.candidates.of(&self.world.scene.geometry, &near);
         clock.lap("load");
-        let view = gbuffer(self.world, self.curvature, &fine);
+        let view = Arc::new(gbuffer(self.world, self.curvature, &fine));
         clock.lap("gbuffer");
         let reflected = mirror_pass(self.world, &view);
         clock.lap("mirror");
@@ -147,7 +148,7 @@ impl<'a> Renderer<'a> {
             None => vec![Rgb::ZERO; glossy.len()],
         };
         let emission: Vec<Rgb> =
-            view.pixels.iter().zip(&view.background).map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission)).collect();
+            view.pixels.par_iter().zip(&view.background).map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission)).collect();
         let frame = Frame {
             emission: downsample(&emission, size, n as usize),
             diffuse: downsample(&diffuse, size, n as usize),
@@ -193,19 +194,19 @@ fn footprint_pass(footprint: &Footprint, view: &GBuffer, reflected: &[Reflected]
 
 fn filter_pass(view: &GBuffer, gathered: &[Gathered], covariance: &[[f32; 3]], params: &FilterParams) -> Vec<Rgb> {
     let [width, height] = view.size();
-    let glossy = |f: &dyn Fn(&Pixel) -> u32| -> Vec<u32> {
-        view.pixels.iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(u32::MAX, f)).collect()
+    let glossy = |f: &(dyn Fn(&Pixel) -> u32 + Sync)| -> Vec<u32> {
+        view.pixels.par_iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(u32::MAX, f)).collect()
     };
     filter(
         &FilterInput {
             width,
             height,
-            color: &gathered.iter().map(|g| g.color).collect::<Vec<_>>(),
-            normal: &view.pixels.iter().map(|p| p.as_ref().map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
-            depth: &view.pixels.iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
+            color: &gathered.par_iter().map(|g| g.color).collect::<Vec<_>>(),
+            normal: &view.pixels.par_iter().map(|p| p.as_ref().map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
+            depth: &view.pixels.par_iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
             material: &glossy(&|p| p.surface.material),
             covariance,
-            energy: &gathered.iter().map(|g| g.energy).collect::<Vec<_>>(),
+            energy: &gathered.par_iter().map(|g| g.energy).collect::<Vec<_>>(),
         },
         params,
     )
