@@ -1,9 +1,9 @@
 //! Baking a probe: reflector, mirror-reflected and glossy maps at the resolution that its parameterisation gives (§4.1, §4.2.2, §6.1).
 
-use super::file::{Probe, Texel};
+use super::file::{NO_TRIANGLE, Probe, Texel};
 use super::qhmap::ParameterMap;
 use crate::lightmap::LightMap;
-use crate::math::{Rgb, hash_words};
+use crate::math::{Rgb, hash_words, luminance};
 use crate::progress::Progress;
 use crate::render::mirror::mirror_hit;
 use crate::transport::bsdf::{Lobes, Query};
@@ -12,13 +12,17 @@ use crate::transport::{Ray, Sampler, Surface, World};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Parameters of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BakeParams {
-    /// Paths a texel. *Paper* (§7): 2048.
+    /// Paths a texel; the most, where `error` is given. *Paper* (§7): 2048.
     pub spp: u32,
+    /// Standard error at which a texel is done, in units of its luminance plus [`ERROR_FLOOR`]; `None` gives each `spp` paths. *Ours*.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<f32>,
     /// Multiplies alpha at the first vertex. *Paper* (§6.1): 0.5.
     pub roughness_scale: f32,
     /// Spread the samples over the texel's solid angle, as far as it shows the reflector that its centre shows, in place of
@@ -29,9 +33,15 @@ pub struct BakeParams {
 
 impl Default for BakeParams {
     fn default() -> Self {
-        Self { spp: 2048, roughness_scale: 0.5, spread: false }
+        Self { spp: 2048, error: None, roughness_scale: 0.5, spread: false }
     }
 }
+
+/// Paths of every texel, from whose variance adaptive sampling decides how many more it takes.
+const PILOT: u32 = 8;
+
+/// Luminance below which errors matter less than in proportion.
+pub const ERROR_FLOOR: f32 = 0.01;
 
 /// The reflector and mirror-reflected maps of a probe; its glossy map is black as yet.
 pub fn probe_geometry(world: &World, position: Vec3, map: ParameterMap) -> Probe {
@@ -75,44 +85,115 @@ pub struct Bake<'a> {
     pub lightmap: Option<&'a LightMap>,
 }
 
+/// What was traced for a probe.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Traced {
+    /// Texels that see a glossy surface and are wanted.
+    pub texels: u64,
+    /// Their paths.
+    pub paths: u64,
+}
+
+/// Sums over the paths of one texel.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    paths: u32,
+    color: Rgb,
+    /// Of luminance, and its square.
+    moments: [f64; 2],
+}
+
+impl Sums {
+    fn and(self, other: Self) -> Self {
+        Self {
+            paths: self.paths + other.paths,
+            color: self.color + other.color,
+            moments: [self.moments[0] + other.moments[0], self.moments[1] + other.moments[1]],
+        }
+    }
+}
+
 /// Fills the glossy map: L(S|D)*S+E with the first vertex' roughness reduced. Texels for which `wanted` does not hold stay black.
-/// Returns how many texels had paths traced. The random stream of a texel is a hash of (seed, probe index, texel), so that no thread count changes a bit.
+/// The random stream of a texel is a hash of (seed, probe index, texel), so that no thread count changes a bit.
+///
+/// Adaptive sampling decides from the first [`PILOT`] paths of a texel and of its neighbours together. Stopping as soon as the texel's own
+/// paths agree would favour those that have missed a rare bright path so far.
 pub fn bake_glossy(
     bake: &Bake,
     probe: &mut Probe,
     index: u32,
     wanted: &(dyn Fn(u32) -> bool + Sync),
     progress: &dyn Progress,
-) -> u64 {
+) -> Traced {
     let Probe { position, texels, map, .. } = probe;
-    let (position, width, map) = (*position, map.size[0], &*map);
-    let bake_row = |(y, row): (usize, &mut [Texel])| {
-        let mut traced = 0;
-        for (x, texel) in row.iter_mut().enumerate() {
-            let i = y as u32 * width + x as u32;
-            if texel.triangle != super::file::NO_TRIANGLE && wanted(i) {
-                let stream = hash_words(&[bake.seed, index, i]);
-                if let Some(glossy) = glossy_texel(bake, position, map, i, stream) {
-                    texel.set_glossy(glossy);
-                    traced += 1;
-                }
-            }
-        }
-        progress.advance(1);
-        traced
+    let (width, map) = (map.size[0], &*map);
+    let sees = |i: u32| texels[i as usize].triangle != NO_TRIANGLE && wanted(i);
+    let trace = |i: u32, samples: Range<u32>| {
+        sees(i).then(|| glossy_texel(bake, *position, map, i, hash_words(&[bake.seed, index, i]), samples)).flatten()
     };
-    texels.par_chunks_mut(width as usize).enumerate().map(bake_row).sum()
+    let count = texels.len() as u32;
+    let all = |samples: &(dyn Fn(u32) -> Range<u32> + Sync), progress: Option<&dyn Progress>| -> Vec<Option<Sums>> {
+        let row = |y: u32| {
+            let row: Vec<_> = (y * width..(y + 1) * width).map(|i| trace(i, samples(i))).collect();
+            if let Some(progress) = progress {
+                progress.advance(1);
+            }
+            row
+        };
+        (0..count / width).into_par_iter().flat_map_iter(row).collect()
+    };
+    let sums = match bake.params.error {
+        None => all(&|_| 0..bake.params.spp, Some(progress)),
+        Some(error) => {
+            let pilot = all(&|_| 0..PILOT.min(bake.params.spp), None);
+            let more = |i: u32| PILOT.min(bake.params.spp)..paths_for(error, bake.params.spp, &pilot, i, width);
+            let rest = all(&more, Some(progress));
+            pilot.iter().zip(rest).map(|(a, b)| a.zip(b).map(|(a, b)| a.and(b))).collect()
+        }
+    };
+    let mut traced = Traced::default();
+    for (texel, sums) in texels.iter_mut().zip(sums) {
+        if let Some(sums) = sums {
+            texel.set_glossy(sums.color / sums.paths as f32);
+            traced.texels += 1;
+            traced.paths += u64::from(sums.paths);
+        }
+    }
+    traced
 }
 
-/// Mean of the paths of one texel; `None` where its centre sees no glossy surface.
-fn glossy_texel(bake: &Bake, position: Vec3, map: &ParameterMap, texel: u32, stream: u32) -> Option<Rgb> {
+/// Paths that bring a texel's standard error down to `error`, by the variance of its pilot paths and its neighbours' about their texels'
+/// means.
+fn paths_for(error: f32, most: u32, pilot: &[Option<Sums>], i: u32, width: u32) -> u32 {
+    let height = pilot.len() as u32 / width;
+    let (x, y) = (i % width, i / width);
+    let (mut squares, mut degrees, mut sum, mut paths) = (0.0, 0.0, 0.0, 0.0);
+    for row in y.saturating_sub(1)..=(y + 1).min(height - 1) {
+        for column in [(x + width - 1) % width, x, (x + 1) % width] {
+            let Some(s) = &pilot[(row * width + column) as usize] else { continue };
+            let n = f64::from(s.paths);
+            squares += (s.moments[1] - s.moments[0] * s.moments[0] / n).max(0.0);
+            degrees += n - 1.0;
+            sum += s.moments[0];
+            paths += n;
+        }
+    }
+    if degrees == 0.0 {
+        return most;
+    }
+    let allowed = f64::from(error) * (sum / paths + f64::from(ERROR_FLOOR));
+    ((squares / degrees / (allowed * allowed)).ceil() as u32).clamp(PILOT.min(most), most)
+}
+
+/// Sums over those of the texel's paths; `None` where its centre sees no glossy surface.
+fn glossy_texel(bake: &Bake, position: Vec3, map: &ParameterMap, texel: u32, stream: u32, samples: Range<u32>) -> Option<Sums> {
     let Bake { world, params, .. } = *bake;
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: params.roughness_scale };
     let to_centre = direction(map, texel, Vec2::splat(0.5));
     let centre = world.intersect(&Ray::new(position, to_centre)).filter(|s| is_glossy(world, s, -to_centre))?;
     let known = bake.lightmap.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&world.scene, s, wo));
-    let mut sum = Rgb::ZERO;
-    for sample in 0..params.spp {
+    let mut sums = Sums::default();
+    for sample in samples {
         let mut sampler = Sampler::new(stream, sample);
         let offset = sampler.next_2d();
         let (mut surface, mut wo) = (centre, -to_centre);
@@ -124,7 +205,9 @@ fn glossy_texel(bake: &Bake, position: Vec3, map: &ParameterMap, texel: u32, str
             }
         }
         let known = known.as_ref().map(|known| known as KnownDiffuse);
-        sum += scattered(world, &surface, wo, query, known, &PathParams::default(), &mut sampler);
+        let color = scattered(world, &surface, wo, query, known, &PathParams::default(), &mut sampler);
+        let y = f64::from(luminance(color));
+        sums = sums.and(Sums { paths: 1, color, moments: [y, y * y] });
     }
-    Some(sum / params.spp as f32)
+    Some(sums)
 }

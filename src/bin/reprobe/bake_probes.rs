@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
-use reprobe::probe::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
+use reprobe::probe::bake::{Bake, BakeParams, Traced, bake_glossy, probe_geometry};
 use reprobe::probe::file::{BakedSet, MAX_MATERIALS};
 use reprobe::probe::placement::ProbeGrid;
 use reprobe::probe::qhmap::{ParameterMap, map_paths};
@@ -30,6 +30,7 @@ use std::time::Instant;
 #[command(after_help = "Examples:
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 256
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --shard 0/4
+  reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --lightmap lightmap.exr --error 0.05 --spp 512
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 128 \\
       --for-path path.json --curvature curvature.exr --size 480x270 --supersample 2")]
 pub struct Args {
@@ -44,9 +45,12 @@ pub struct Args {
     /// Folder of baked probes to write
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Paths a texel
+    /// Paths a texel; the most of them with --error
     #[arg(long, value_name = "N", default_value_t = BakeParams::default().spp)]
     spp: u32,
+    /// Trace a texel until its standard error is this fraction of its luminance, by the variance of its first 8 paths and its neighbours'
+    #[arg(long, value_name = "E")]
+    error: Option<f32>,
     /// Factor on roughness at the first glossy vertex
     #[arg(long, value_name = "S", default_value_t = BakeParams::default().roughness_scale)]
     roughness_scale: f32,
@@ -87,6 +91,9 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     if args.spp == 0 || !(args.roughness_scale > 0.0 && args.roughness_scale <= 1.0) {
         bail!("--spp {} --roughness-scale {}: expected at least 1, and a factor in (0, 1]", args.spp, args.roughness_scale);
     }
+    if let Some(error) = args.error.filter(|e| !(*e > 0.0 && *e < f32::INFINITY)) {
+        bail!("--error {error}: expected a positive number, such as 0.05 for 5 %");
+    }
     let world = common.opaque_world(&args.scene)?;
     let scene = &world.scene;
     if scene.materials.len() > MAX_MATERIALS {
@@ -102,7 +109,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     maps.provenance.check_scene(&args.qhmap, &scene.hash)?;
     maps.provenance.check_input(&args.qhmap, "probes", &hash_file(&args.probes)?)?;
 
-    let params = BakeParams { spp: args.spp, roughness_scale: args.roughness_scale, spread: args.spread };
+    let params = BakeParams { spp: args.spp, error: args.error, roughness_scale: args.roughness_scale, spread: args.spread };
     let progress = common.progress();
     let gather = apply(&if args.paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() }, &args.set)?.gather;
     let for_path = match &args.for_path {
@@ -144,7 +151,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let baked = todo.len();
     let lightmap = args.lightmap.as_ref().map(|file| LightMap::load(file, scene)).transpose()?;
     let shared = Bake { world: &world, params: &params, seed: common.seed, lightmap: lightmap.as_ref() };
-    let texels = bake(args, &shared, &maps, &grid, &provenance, todo, wanted, &progress)?;
+    let traced = bake(args, &shared, &maps, &grid, &provenance, todo, wanted, &progress)?;
 
     let missing = needed.iter().filter(|&&i| !finished(i)).count();
     if missing == 0 {
@@ -164,17 +171,18 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
     Ok(Outcome {
         summary: format!(
-            "{}: {baked} probes baked, {} kept, {texels} glossy texels at {} paths, {seconds:.1} s{rest}",
+            "{}: {baked} probes baked, {} kept, {} glossy texels at {:.0} paths, {seconds:.1} s{rest}",
             args.output.display(),
             needed.len() - baked - missing,
-            args.spp
+            traced.texels,
+            traced.paths as f64 / traced.texels.max(1) as f64
         ),
-        figures: json!({ "probes": needed.len(), "baked": baked, "missing": missing, "texels": texels, "spp": args.spp, "seconds": seconds }),
+        figures: json!({ "probes": needed.len(), "baked": baked, "missing": missing, "texels": traced.texels, "paths": traced.paths, "spp": args.spp, "seconds": seconds }),
         ..Outcome::default()
     })
 }
 
-/// Bakes and writes the probes in `todo`; returns how many texels had paths traced.
+/// Bakes and writes the probes in `todo`; returns what was traced.
 #[allow(clippy::too_many_arguments, reason = "called once; a struct would only rename its arguments")]
 fn bake(
     args: &Args,
@@ -185,21 +193,23 @@ fn bake(
     todo: Vec<usize>,
     mut wanted: Option<BTreeMap<usize, Wanted>>,
     progress: &dyn Progress,
-) -> anyhow::Result<u64> {
+) -> anyhow::Result<Traced> {
     let rows = maps.size[1] as u64;
     progress.start("probes", todo.len() as u64 * rows);
-    let mut texels = 0;
+    let mut traced = Traced::default();
     for index in todo {
         let (mut probe, flags) = match wanted.as_mut().and_then(|w| w.remove(&index)) {
             Some(w) => (w.probe, Some(w.texels)),
             None => (probe_geometry(shared.world, grid.position(index), ParameterMap::load(&args.qhmap, index)?.0), None),
         };
         let want = |i: u32| flags.as_ref().is_none_or(|f| f[i as usize]);
-        texels += bake_glossy(shared, &mut probe, index as u32, &want, progress);
+        let Traced { texels, paths } = bake_glossy(shared, &mut probe, index as u32, &want, progress);
+        traced.texels += texels;
+        traced.paths += paths;
         let [forward, inverse] = map_paths(&args.output, index);
         probe.map.forward_image().with_provenance(provenance.clone()).write(&forward)?;
         probe.to_image(provenance.clone()).write(&inverse)?;
     }
     progress.finish();
-    Ok(texels)
+    Ok(traced)
 }
