@@ -1,7 +1,7 @@
 //! Rays a second: `cargo bench --bench rays -- [--write FOLDER] SCENE...`.
 //!
 //! The rays are those of paths: through the pixels of the scene's sensor, then cosine-distributed bounces; and from each hit
-//! one to a random point of the scene's emitters, or to another hit where there is none, for any hit. All are shuffled. With
+//! one to a random point of the scene's emitters, for any hit. All are shuffled, and alpha masks are left out. With
 //! --write they and the triangles go to FOLDER, for `scripts/bench_vs_embree.py`. Without a scene it says so and ends.
 
 use glam::{Vec2, Vec3};
@@ -122,7 +122,8 @@ fn main() {
         println!("rays: no scene given, nothing measured");
     }
     for path in scenes {
-        let scene = reprobe::scene::load(Path::new(&path), &Default::default()).expect("a scene");
+        let mut scene = reprobe::scene::load(Path::new(&path), &Default::default()).expect("a scene");
+        scene.materials.iter_mut().for_each(|m| m.opacity = None);
         let start = Instant::now();
         let world = World::new(scene);
         let build = start.elapsed().as_secs_f64();

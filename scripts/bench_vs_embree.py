@@ -6,7 +6,7 @@
 Runs `cargo bench --bench rays -- --write` and Embree in turn on the same triangles and rays: those of paths (camera, then
 cosine-distributed bounces), and shadow rays, both shuffled. One thread, one ray a call (rtcIntersect1, rtcOccluded1) from
 compiled code, processor time. Closest hits agree where both meet the same triangle, or both miss, or the distances differ by less
-than 1e-4 of them (edges that triangles share). Alpha masks are not in Embree's scene: rays that they touch count as differences.
+than 1e-4 of them (edges that triangles share). Alpha masks are left out of both.
 
 Needs: pip install embreex numpy.
 """

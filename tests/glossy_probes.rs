@@ -207,3 +207,34 @@ fn texel_coordinates_wrap_around_and_stop_at_the_poles() {
     assert_eq!(probe.index(0, 9), 24);
     assert!(std::ptr::eq(probe.texel(Vec2::new(-0.5, -2.0)), &raw const probe.texels[7]));
 }
+
+#[test]
+fn adaptive_sampling_spends_paths_where_they_are_needed() {
+    const ERROR: f32 = 0.1;
+    const MOST: u32 = 1024;
+    let bake = |reflector: &str, error: Option<f32>, seed: u32| {
+        let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{reflector}</shape>"#)));
+        let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([32, 16]));
+        let params = BakeParams { spp: MOST, error, ..BakeParams::default() };
+        let traced =
+            bake_glossy(&Bake { world: &world, params: &params, seed, lightmap: None }, &mut probe, 0, &|_| true, &Silent);
+        let glossy: Vec<Vec3> = probe.texels.iter().map(|t| t.glossy()).collect();
+        (traced, glossy)
+    };
+    let (mirror, _) = bake(MIRROR, Some(ERROR), 1);
+    assert!(mirror.texels > 50 && mirror.paths == 8 * mirror.texels, "a mirror's paths all agree: {mirror:?}");
+
+    let rough = r#"<bsdf type="roughconductor"><float name="alpha" value="0.4"/><string name="material" value="none"/></bsdf>"#;
+    let (adaptive, found) = bake(rough, Some(ERROR), 1);
+    let (full, exact) = bake(rough, None, 2);
+    assert_eq!((adaptive.texels, full.paths), (full.texels, u64::from(MOST) * full.texels));
+    assert!(adaptive.paths < full.paths / 4, "{adaptive:?} of {full:?}");
+    assert_eq!(bake(rough, Some(ERROR), 1).1, found);
+    let lit: Vec<_> = found.iter().zip(&exact).filter(|(_, e)| e.element_sum() > 0.0).collect();
+    let sum = |pick: &dyn Fn(&(&Vec3, &Vec3)) -> f32| lit.iter().map(pick).sum::<f32>();
+    let square = sum(&|(f, e)| ((f.element_sum() - e.element_sum()) / e.element_sum()).powi(2)) / lit.len() as f32;
+    // Stratified samples do better than the variance of independent ones says.
+    assert!((0.2 * ERROR..1.2 * ERROR).contains(&square.sqrt()), "{}", square.sqrt());
+    let bias = sum(&|(f, _)| f.element_sum()) / sum(&|(_, e)| e.element_sum()) - 1.0;
+    assert!(bias.abs() < 0.01, "{bias}");
+}

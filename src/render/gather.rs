@@ -48,6 +48,7 @@ pub struct GatherParams {
     pub search: Vec<SearchLevel>,
     /// Of the pixels, one in so many each way is searched for in full; those between begin where these ended, with the finest
     /// level alone, unless that is much worse. *Paper*: 1, each. *Ours*: 4, a quarter of the time for the same error.
+    #[serde(default = "every_pixel")]
     pub anchors: usize,
     /// s_a, the factor on the energy where the reflected materials differ. *Paper*: 10.
     pub material_penalty: f32,
@@ -61,6 +62,11 @@ pub struct GatherParams {
     pub bilinear: BilinearRule,
     /// Divide the lobe's directional albedo out of a probe's sample and multiply the view's in. *Ours*; the paper does not.
     pub albedo_ratio: bool,
+}
+
+/// What sets of probes say that were baked before there were anchors.
+fn every_pixel() -> usize {
+    1
 }
 
 impl Default for GatherParams {

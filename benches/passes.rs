@@ -1,0 +1,84 @@
+//! Milliseconds of each pass of a frame by glossy probes, on all cores: `cargo bench --bench passes -- SCENE PROBES CURVATURE.exr [WxH]`.
+//!
+//! The view is that of the scene's own sensor, with the probes around it: use a set that was baked for all views. The best of a few
+//! runs of each. Without arguments it says so and ends.
+
+use reprobe::probe::store::ProbeStore;
+use reprobe::render::candidates::NearCandidates;
+use reprobe::render::filter::{FilterInput, FilterParams, filter};
+use reprobe::render::gather::{GatherParams, gather};
+use reprobe::render::gbuffer::gbuffer;
+use reprobe::render::glossy_probes::nearest_probes;
+use reprobe::render::mirror::mirror_pass;
+use reprobe::scene::Camera;
+use reprobe::surface::curvature_file;
+use reprobe::transport::World;
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+const RUNS: usize = 3;
+
+fn time<T>(what: &str, mut f: impl FnMut() -> T) -> T {
+    let mut runs = (0..RUNS).map(|_| {
+        let start = Instant::now();
+        let result = black_box(f());
+        (start.elapsed().as_secs_f64(), result)
+    });
+    let first = runs.next().expect("at least one run");
+    let (best, result) = runs.fold(first, |a, b| if b.0 < a.0 { b } else { a });
+    println!("{what:36} {:8.1} ms", best * 1e3);
+    result
+}
+
+fn main() {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let [scene, probes, curvature, rest @ ..] = args.as_slice() else {
+        println!("passes: SCENE, PROBES and CURVATURE.exr are not given, nothing measured");
+        return;
+    };
+    let size =
+        rest.first().and_then(|s| s.split_once('x')).map_or([1920, 1080], |(w, h)| [w, h].map(|n| n.parse().expect("WxH")));
+    let scene = reprobe::scene::load(Path::new(scene), &Default::default()).expect("a scene");
+    let (world, _) = World::opaque(scene);
+    let curvature = curvature_file::read(Path::new(curvature), world.scene.geometry.positions.len(), &world.scene.hash);
+    let curvature = curvature.expect("curvatures of this scene");
+    let camera = Camera { size, ..world.scene.sensor.clone().expect("a sensor") };
+    let mut store = ProbeStore::open(Path::new(probes), &world.scene, u64::MAX).expect("probes of this scene");
+    let near: Vec<_> = nearest_probes(&store.set.grid, camera.position(), 8)
+        .into_iter()
+        .map(|(i, weight)| (i, store.probe(i).expect("a probe"), weight))
+        .collect();
+    let near: Vec<_> = near.iter().map(|(i, probe, weight)| (*i, &**probe, *weight)).collect();
+    let mut candidates = NearCandidates::default();
+    let weighted = candidates.of(&world.scene.geometry, &near);
+
+    let view = time("G-buffer", || gbuffer(&world, &curvature, &camera));
+    let reflected = time("mirror", || mirror_pass(&world, &view));
+    let params = GatherParams::default();
+    let gather_with = |params: &GatherParams| gather(&world, &view, &reflected, &weighted, store.set.roughness_scale, params);
+    let gathered = time("gather", || gather_with(&params));
+    time("gather, every pixel in full", || gather_with(&GatherParams { anchors: 1, ..params.clone() }));
+
+    let glossy = |p: &reprobe::render::gbuffer::Pixel| p.alpha.map_or(u32::MAX, |_| p.surface.material);
+    let color: Vec<_> = gathered.iter().map(|g| g.color).collect();
+    let energy: Vec<_> = gathered.iter().map(|g| g.energy).collect();
+    let normal: Vec<_> = view.pixels.iter().map(|p| p.as_ref().map_or(glam::Vec3::ZERO, |p| p.normal)).collect();
+    let depth: Vec<_> = view.pixels.iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect();
+    let material: Vec<_> = view.pixels.iter().map(|p| p.as_ref().map_or(u32::MAX, glossy)).collect();
+    for sigma in [1.0, 4.0, 16.0] {
+        let covariance = vec![[sigma * sigma, 0.0, sigma * sigma]; color.len()];
+        let [width, height] = size.map(|n| n as usize);
+        let input = FilterInput {
+            width,
+            height,
+            color: &color,
+            normal: &normal,
+            depth: &depth,
+            material: &material,
+            covariance: &covariance,
+            energy: &energy,
+        };
+        time(&format!("filter of {sigma} pixels"), || filter(&input, &FilterParams::default()));
+    }
+}
