@@ -44,7 +44,7 @@ fn main() {
     let curvature = curvature_file::read(Path::new(curvature), world.scene.geometry.positions.len(), &world.scene.hash);
     let curvature = curvature.expect("curvatures of this scene");
     let camera = Camera { size, ..world.scene.sensor.clone().expect("a sensor") };
-    let mut store = ProbeStore::open(Path::new(probes), &world.scene, u64::MAX).expect("probes of this scene");
+    let mut store = ProbeStore::open(Path::new(probes), &world.scene, usize::MAX).expect("probes of this scene");
     let near: Vec<_> = nearest_probes(&store.set.grid, camera.position(), 8)
         .into_iter()
         .map(|(i, weight)| (i, store.probe(i).expect("a probe"), weight))
