@@ -213,8 +213,9 @@ fn adaptive_sampling_spends_paths_where_they_are_needed() {
     const ERROR: f32 = 0.1;
     const MOST: u32 = 1024;
     let bake = |reflector: &str, error: Option<f32>, seed: u32| {
-        let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{reflector}</shape>"#)));
-        let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([32, 16]));
+        let lift = r#"<transform name="to_world"><translate value="0,0,0.1"/></transform>"#;
+        let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{lift}{reflector}</shape>"#)));
+        let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([64, 32]));
         let params = BakeParams { spp: MOST, error, ..BakeParams::default() };
         let traced =
             bake_glossy(&Bake { world: &world, params: &params, seed, lightmap: None }, &mut probe, 0, &|_| true, &Silent);
@@ -222,7 +223,7 @@ fn adaptive_sampling_spends_paths_where_they_are_needed() {
         (traced, glossy)
     };
     let (mirror, _) = bake(MIRROR, Some(ERROR), 1);
-    assert!(mirror.texels > 50 && mirror.paths == 8 * mirror.texels, "a mirror's paths all agree: {mirror:?}");
+    assert!(mirror.texels > 40 && mirror.paths == 8 * mirror.texels, "a mirror's paths all agree: {mirror:?}");
 
     let rough = r#"<bsdf type="roughconductor"><float name="alpha" value="0.4"/><string name="material" value="none"/></bsdf>"#;
     let (adaptive, found) = bake(rough, Some(ERROR), 1);
