@@ -132,9 +132,9 @@ pub fn bake_glossy(
         sees(i).then(|| glossy_texel(bake, *position, map, i, hash_words(&[bake.seed, index, i]), samples)).flatten()
     };
     let count = texels.len() as u32;
-    let all = |samples: &(dyn Fn(u32) -> Range<u32> + Sync), progress: Option<&dyn Progress>| -> Vec<Option<Sums>> {
+    let each = |texel: &(dyn Fn(u32) -> Option<Sums> + Sync), progress: Option<&dyn Progress>| -> Vec<Option<Sums>> {
         let row = |y: u32| {
-            let row: Vec<_> = (y * width..(y + 1) * width).map(|i| trace(i, samples(i))).collect();
+            let row: Vec<_> = (y * width..(y + 1) * width).map(texel).collect();
             if let Some(progress) = progress {
                 progress.advance(1);
             }
@@ -142,13 +142,17 @@ pub fn bake_glossy(
         };
         (0..count / width).into_par_iter().flat_map_iter(row).collect()
     };
+    let most = bake.params.spp;
     let sums = match bake.params.error {
-        None => all(&|_| 0..bake.params.spp, Some(progress)),
+        None => each(&|i| trace(i, 0..most), Some(progress)),
         Some(error) => {
-            let pilot = all(&|_| 0..PILOT.min(bake.params.spp), None);
-            let more = |i: u32| PILOT.min(bake.params.spp)..paths_for(error, bake.params.spp, &pilot, i, width);
-            let rest = all(&more, Some(progress));
-            pilot.iter().zip(rest).map(|(a, b)| a.zip(b).map(|(a, b)| a.and(b))).collect()
+            let pilot = each(&|i| trace(i, 0..PILOT.min(most)), None);
+            let rest = |i: u32| {
+                let first = pilot[i as usize]?;
+                let paths = paths_for(error, most, &pilot, i, width);
+                if paths > first.paths { trace(i, first.paths..paths).map(|more| first.and(more)) } else { Some(first) }
+            };
+            each(&rest, Some(progress))
         }
     };
     let mut traced = Traced::default();

@@ -241,7 +241,7 @@ pub fn best_samples(
         })
         .collect();
     let step = params.anchors.max(1);
-    let place = |i: usize| [i % width, i / width];
+    let place = |i: usize| [i % width % TILE, i / width % TILE];
     let is_anchor = |i: usize| place(i).iter().all(|x| x.is_multiple_of(step));
     let mut samples = vec![[None; 8]; tile.len()];
     // By place in the tile: where an anchor's search ended, from where it began.
@@ -252,12 +252,12 @@ pub fn best_samples(
         for ((samples, (target, path)), &(i, _)) in samples.iter_mut().zip(&targets).zip(tile).filter(|(_, t)| is_anchor(t.0)) {
             let Some(centre) = begin(path) else { continue };
             samples[k] = search(w, centre, target, &params.search, None, params);
-            let [x, y] = place(i).map(|x| x % TILE);
+            let [x, y] = place(i);
             ends[y * TILE + x] = samples[k].map(|s| (s.texel - centre, s.energy, target.material));
         }
         for ((samples, (target, path)), &(i, _)) in samples.iter_mut().zip(&targets).zip(tile).filter(|(_, t)| !is_anchor(t.0)) {
             let Some(centre) = begin(path) else { continue };
-            let [x, y] = place(i).map(|x| x % TILE / step * step);
+            let [x, y] = place(i).map(|x| x / step * step);
             let around = [(0, 0), (step, 0), (0, step), (step, step)].into_iter().filter_map(|(dx, dy)| {
                 let inside = x + dx < TILE && y + dy < TILE;
                 inside.then(|| ends[(y + dy) * TILE + x + dx]).flatten().filter(|a| a.2 == target.material)
@@ -288,7 +288,7 @@ fn between_anchors(
     for (end, energy, _) in around {
         allowed = allowed.max(energy * ANCHOR_TOLERANCE.0 + ANCHOR_TOLERANCE.1);
         let texel = centre + end;
-        if let Some(energy) = w.energy_below(least, texel, target, params) {
+        if let Some(energy) = w.energy_below(least, w.probe.index_at(texel), target, params) {
             (least, start) = (energy, Some(Sample { energy, texel }));
         }
     }
@@ -337,9 +337,10 @@ impl WeightedProbe<'_> {
         (x - self.probe.position).try_normalize().map(|d| self.probe.map.texel_from_direction(d))
     }
 
-    /// [`energy_below`] of the texel at `at`, whose reflector must be of the target's material.
-    fn energy_below(&self, limit: f32, at: Vec2, target: &Target, params: &GatherParams) -> Option<f32> {
-        let candidate = &self.candidates[self.probe.index_at(at)];
+    /// [`energy_below`] of a texel, whose reflector must be of the target's material.
+    #[inline]
+    fn energy_below(&self, limit: f32, texel: usize, target: &Target, params: &GatherParams) -> Option<f32> {
+        let candidate = &self.candidates[texel];
         let same = candidate.material == target.material;
         same.then(|| energy_below(limit, &target.at_view, &candidate.reflection, params.material_penalty)).flatten()
     }
@@ -364,11 +365,7 @@ fn search(
             let row = probe.row(floor(y));
             for i in -level.radius..=level.radius {
                 let x = centre.x + step.x * i as f32;
-                let candidate = &w.candidates[row + probe.column(floor(x))];
-                if candidate.material != target.material {
-                    continue;
-                }
-                if let Some(energy) = energy_below(least, &target.at_view, &candidate.reflection, params.material_penalty) {
+                if let Some(energy) = w.energy_below(least, row + probe.column(floor(x)), target, params) {
                     least = energy;
                     found = Vec2::new(x, y);
                 }

@@ -87,9 +87,9 @@ impl LightTree {
         // (node, range of `order` that hangs from it)
         let mut todo = vec![(0, 0..order.len())];
         while let Some((node, range)) = todo.pop() {
-            for (slot, part) in parts(bounds, &mut order, range).into_iter().enumerate() {
+            for (slot, (part, whole)) in parts(bounds, &mut order, range).into_iter().enumerate() {
                 let place = (node as u32, slot as u32);
-                tree.nodes[node].set(slot, &LightBounds::of(bounds, &order[part.clone()]));
+                tree.nodes[node].set(slot, &whole);
                 tree.nodes[node].children[slot] = if let [only] = order[part.clone()] {
                     tree.place[only as usize] = place;
                     Child::Emitter(only)
@@ -223,17 +223,20 @@ fn less(cos_a: f32, sin_a: f32, cos_b: f32, sin_b: f32) -> (f32, f32) {
     if cos_a > cos_b { (1.0, 0.0) } else { (cos, sin) }
 }
 
-/// Cuts a range of `order` into at most [`WIDTH`] parts, by halving the costliest again and again.
-fn parts(bounds: &[LightBounds], order: &mut [u32], range: Range<usize>) -> Vec<Range<usize>> {
-    let mut parts = vec![range];
+/// Cuts a range of `order` into at most [`WIDTH`] parts, by halving the costliest again and again; each with its bounds.
+fn parts(bounds: &[LightBounds], order: &mut [u32], range: Range<usize>) -> Vec<(Range<usize>, LightBounds)> {
+    let with_bounds = |order: &[u32], part: Range<usize>| {
+        let whole = LightBounds::of(bounds, &order[part.clone()]);
+        (part, whole)
+    };
+    let mut parts = vec![with_bounds(order, range)];
     while parts.len() < WIDTH {
-        let cost = |r: &Range<usize>| LightBounds::of(bounds, &order[r.clone()]).cost();
-        let splittable = (0..parts.len()).filter(|&k| parts[k].len() > 1);
-        let Some(widest) = splittable.max_by(|&a, &b| cost(&parts[a]).total_cmp(&cost(&parts[b]))) else { break };
-        let part = parts[widest].clone();
+        let splittable = (0..parts.len()).filter(|&k| parts[k].0.len() > 1);
+        let Some(widest) = splittable.max_by(|&a, &b| parts[a].1.cost().total_cmp(&parts[b].1.cost())) else { break };
+        let part = parts[widest].0.clone();
         let middle = part.start + split(bounds, &mut order[part.clone()]);
-        parts[widest] = part.start..middle;
-        parts.push(middle..part.end);
+        parts[widest] = with_bounds(order, part.start..middle);
+        parts.push(with_bounds(order, middle..part.end));
     }
     parts
 }

@@ -169,10 +169,10 @@ fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, 
     }
     let [light_x, light_y, light_choice, _] = sampler.next_4d();
     let [x, y, lobe, _] = sampler.next_4d();
-    let mut sum = vertex.direct(light_choice, Vec2::new(light_x, light_y));
+    let from = vertex.receiver();
+    let mut sum = vertex.direct(&from, light_choice, Vec2::new(light_x, light_y));
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
         let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
-        let from = vertex.receiver();
         let start = Start { ray, from, pdf: sample.pdf, delta: sample.delta, eta: sample.eta, depth: 1 };
         sum += sample.weight * incident(vertex.world, start, known, params, sampler);
     }
@@ -214,7 +214,8 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
         let [x, y, lobe, _] = sampler.next_4d();
         let measure = Measure::Scattering { wi: surface.frame.to_local(wo), query };
         let vertex = Vertex { world, surface: &surface, measure };
-        sum += throughput * vertex.direct(light_choice, Vec2::new(light_x, light_y));
+        from = vertex.receiver();
+        sum += throughput * vertex.direct(&from, light_choice, Vec2::new(light_x, light_y));
         let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) else { return sum };
         throughput *= sample.weight;
         eta *= sample.eta;
@@ -226,7 +227,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
             }
             throughput /= survival;
         }
-        (from, pdf, delta) = (vertex.receiver(), sample.pdf, sample.delta);
+        (pdf, delta) = (sample.pdf, sample.delta);
         ray = surface.spawn(surface.frame.to_world(sample.wo));
     }
 }
@@ -247,9 +248,9 @@ impl Vertex<'_> {
     }
 
     /// Next-event estimation: light straight from an emitter, weighted against finding it by [`Vertex::sample`].
-    fn direct(&self, choice: f32, v: Vec2) -> Rgb {
+    fn direct(&self, receiver: &Receiver, choice: f32, v: Vec2) -> Rgb {
         let world = self.world;
-        let Some(light) = world.lights.sample(&world.scene, &self.receiver(), choice, v) else { return Rgb::ZERO };
+        let Some(light) = world.lights.sample(&world.scene, receiver, choice, v) else { return Rgb::ZERO };
         let wo = self.surface.frame.to_local(light.wi);
         let (value, pdf) = self.eval_pdf(wo);
         if value == Rgb::ZERO || light.weight == Rgb::ZERO || world.occluded(&self.shadow_ray(&light)) {
