@@ -1,26 +1,14 @@
 //! Seconds that a probe's resolution map and parameterisation take on one core: `cargo bench --bench maps`.
-//! The aim: 252 probes in 60 s on 2 cores, i.e. 0.47 s of one core a probe, files included.
+//! The aim: 252 probes in 30 s on 2 cores, i.e. 0.24 s of one core a probe, files included.
+
+mod timing;
 
 use glam::Vec3;
 use reprobe::probe::qhmap::{ParameterMap, QhmapParams};
 use reprobe::probe::quasi_harmonic::Solver;
 use reprobe::probe::resmap::{ResmapParams, resolution_map};
 use reprobe::probe::seen::{Seen, SeenBuffers};
-use std::hint::black_box;
-use std::time::Instant;
-
-/// Best of `n` runs, printed.
-fn time<T>(what: &str, n: u32, mut f: impl FnMut() -> T) -> T {
-    let mut best = f64::INFINITY;
-    let mut result = None;
-    for _ in 0..n {
-        let start = Instant::now();
-        result = Some(black_box(f()));
-        best = best.min(start.elapsed().as_secs_f64());
-    }
-    println!("{what:40} {:8.1} ms", best * 1e3);
-    result.expect("at least one run")
-}
+use timing::time;
 
 /// A bumpy ball of glossy stuff below, diffuse stuff above.
 fn see(d: Vec3) -> Option<Seen> {

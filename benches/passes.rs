@@ -3,6 +3,8 @@
 //! The view is that of the scene's own sensor, with the probes around it: use a set that was baked for all views. The best of a few
 //! runs of each. Without arguments it says so and ends.
 
+mod timing;
+
 use reprobe::probe::store::ProbeStore;
 use reprobe::render::candidates::NearCandidates;
 use reprobe::render::filter::{FilterInput, FilterParams, filter};
@@ -13,23 +15,10 @@ use reprobe::render::mirror::mirror_pass;
 use reprobe::scene::Camera;
 use reprobe::surface::curvature_file;
 use reprobe::transport::World;
-use std::hint::black_box;
 use std::path::Path;
-use std::time::Instant;
+use timing::time;
 
 const RUNS: usize = 3;
-
-fn time<T>(what: &str, mut f: impl FnMut() -> T) -> T {
-    let mut runs = (0..RUNS).map(|_| {
-        let start = Instant::now();
-        let result = black_box(f());
-        (start.elapsed().as_secs_f64(), result)
-    });
-    let first = runs.next().expect("at least one run");
-    let (best, result) = runs.fold(first, |a, b| if b.0 < a.0 { b } else { a });
-    println!("{what:36} {:8.1} ms", best * 1e3);
-    result
-}
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -53,12 +42,12 @@ fn main() {
     let mut candidates = NearCandidates::default();
     let weighted = candidates.of(&world.scene.geometry, &near);
 
-    let view = time("G-buffer", || gbuffer(&world, &curvature, &camera));
-    let reflected = time("mirror", || mirror_pass(&world, &view));
+    let view = time("G-buffer", RUNS, || gbuffer(&world, &curvature, &camera));
+    let reflected = time("mirror", RUNS, || mirror_pass(&world, &view));
     let params = GatherParams::default();
     let gather_with = |params: &GatherParams| gather(&world, &view, &reflected, &weighted, store.set.roughness_scale, params);
-    let gathered = time("gather", || gather_with(&params));
-    time("gather, every pixel in full", || gather_with(&GatherParams { anchors: 1, ..params.clone() }));
+    let gathered = time("gather", RUNS, || gather_with(&params));
+    time("gather, every pixel in full", RUNS, || gather_with(&GatherParams { anchors: 1, ..params.clone() }));
 
     let glossy = |p: &reprobe::render::gbuffer::Pixel| p.alpha.map_or(u32::MAX, |_| p.surface.material);
     let color: Vec<_> = gathered.iter().map(|g| g.color).collect();
@@ -79,6 +68,6 @@ fn main() {
             covariance: &covariance,
             energy: &energy,
         };
-        time(&format!("filter of {sigma} pixels"), || filter(&input, &FilterParams::default()));
+        time(&format!("filter of {sigma} pixels"), RUNS, || filter(&input, &FilterParams::default()));
     }
 }

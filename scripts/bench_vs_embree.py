@@ -21,11 +21,16 @@ import time
 
 import numpy as np
 
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from mitsuba_reference import scene_name
+
 try:
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 except ImportError as error:
     sys.exit(f"bench_vs_embree: error: {error}; install it with: pip install embreex numpy")
+
+UNOCCLUDED = -1  # embreex's answer to a shadow ray that meets nothing
 
 
 def embree(folder):
@@ -43,10 +48,9 @@ def embree(folder):
         return len(o) / 1e6 / (time.process_time() - began), found
 
     closest_rate, hits = timed(*closest, "INTERSECT")
-    far = shadow[2].copy()
     any_rate, blocked = timed(*shadow, "OCCLUDED")
-    distance, _ = timed(*closest, "DISTANCE")[1], far
-    return (closest_rate, any_rate), np.asarray(hits), np.asarray(distance), np.asarray(blocked)
+    distance = scene.run(*closest[:2], closest[2].copy(), query="DISTANCE")
+    return (closest_rate, any_rate), np.asarray(hits), np.asarray(distance), np.asarray(blocked) != UNOCCLUDED
 
 
 def agreement(folder, hits, distance, blocked):
@@ -54,9 +58,10 @@ def agreement(folder, hits, distance, blocked):
     own = np.fromfile(os.path.join(folder, "hits.f32"), dtype=np.float32).reshape(-1, 2)
     triangle = own[:, 0].copy().view(np.uint32).astype(np.int64)
     triangle[triangle == 0xFFFFFFFF] = -1
-    near = np.abs(own[:, 1] - distance) <= 1e-4 * distance
+    with np.errstate(invalid="ignore"):  # infinities of rays that miss
+        near = np.abs(own[:, 1] - distance) <= 1e-4 * distance
     own_blocked = np.fromfile(os.path.join(folder, "blocked.u8"), dtype=np.uint8).astype(bool)
-    return np.mean((triangle == hits) | near), np.mean(own_blocked == (blocked != -1) if blocked.min() < 0 else own_blocked == (blocked != 0))
+    return np.mean((triangle == hits) | near), np.mean(own_blocked == blocked)
 
 
 def main():
@@ -67,7 +72,7 @@ def main():
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     print(f"{'scene':28} {'':8} {'ours M/s':>9} {'Embree':>8} {'ratio':>22} {'agree':>10}")
     for path in args.scenes:
-        name = "-".join(os.path.splitext(os.path.abspath(path))[0].split(os.sep)[-2:])
+        name = scene_name(path)
         rows = []
         with tempfile.TemporaryDirectory() as folder:
             for _ in range(args.runs):

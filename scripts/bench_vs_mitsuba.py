@@ -26,7 +26,8 @@ import time
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from mitsuba_reference import import_mitsuba, load_scene, sensors
+from layers_vs_mitsuba import read_layers
+from mitsuba_reference import import_mitsuba, load_scene, scene_name, sensors
 
 OFFSET = 0.01
 TRIMMED = 0.001
@@ -55,9 +56,7 @@ def reprobe(mi, args, scene, seed):
         command = [args.reprobe, "render-path", scene, "-o", folder, "--method", "path-trace", "--layers", args.layers]
         command += ["--spp", str(args.spp), "--size", args.size, "--seed", str(seed), "--json"]
         figures = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
-        bitmap = mi.Bitmap(os.path.join(folder, "0000.exr"))
-        channels = [bitmap.struct_()[i].name for i in range(bitmap.channel_count())]
-        image = np.array(bitmap, dtype=np.float64)[:, :, [channels.index(c) for c in "RGB"]]
+        image = read_layers(mi, os.path.join(folder, "0000.exr"), ["full"])["full"]
         return image, figures["mean_ms"]["path_trace"] / 1e3
 
 
@@ -102,7 +101,7 @@ def main():
     results = {}
     print(f"{'scene':28} {'ours M/s':>9} {'Mitsuba':>8} {'ratio':>22} {'ours relMSE':>12} {'Mitsuba':>9} {'time to equal error':>24}")
     for scene in args.scenes:
-        name = "-".join(os.path.splitext(os.path.abspath(scene))[0].split(os.sep)[-2:])
+        name = scene_name(scene)
         renderer = Mitsuba(mi, scene, size, args.spp)
         stored = os.path.join(args.output, f"{name}-{args.size}-{args.reference_spp}.npy")
         mean, noise = reference(renderer, stored, args.reference_spp)

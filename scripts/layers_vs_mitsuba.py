@@ -19,7 +19,7 @@ import sys
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from mitsuba_reference import import_mitsuba
+from mitsuba_reference import import_mitsuba, scene_name
 
 LAYERS = ("full", "glossy", "diffuse")
 MAX_RMSE_RATIO = 1.1
@@ -27,13 +27,13 @@ MAX_MEAN_DIFFERENCE = 0.005
 CAP_PERCENTILE = 99.5
 
 
-def read_layers(mi, path):
+def read_layers(mi, path, layers=LAYERS):
     """Layer name to an array of height x width x 3."""
     bitmap = mi.Bitmap(path)
     channels = {bitmap.struct_()[i].name: i for i in range(bitmap.channel_count())}
     pixels = np.array(bitmap, dtype=np.float64)
     pick = lambda layer: pixels[:, :, [channels[c if layer == "full" else f"{layer}.{c}"] for c in "RGB"]]
-    return {layer: pick(layer) for layer in LAYERS}
+    return {layer: pick(layer) for layer in layers}
 
 
 def render(command, output):
@@ -68,7 +68,7 @@ def main():
     print(f"{'scene':32} {'layer':8} {'ours':>9} {'Mitsuba':>9} {'ratio':>6} {'mean':>8}")
     passed = True
     for scene in args.scenes:
-        name = "-".join(os.path.splitext(os.path.abspath(scene))[0].split(os.sep)[-2:])
+        name = scene_name(scene)
         folder = lambda what: os.path.join(args.output, f"{name}-{args.size}-{args.spp}", what)
         script = [sys.executable, os.path.join(here, "mitsuba_reference.py"), scene, *sampling, "-1"]
         frames = [render([*script, "--seed", str(k), "--layers", ",".join([*LAYERS, "emission"])], folder(f"mitsuba-{k}")) for k in (1, 2)]

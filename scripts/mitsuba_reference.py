@@ -66,6 +66,11 @@ def import_mitsuba(variant):
     return mitsuba
 
 
+def scene_name(path):
+    """A name for tables and files: the scene's folder and its file, without the extension."""
+    return "-".join(os.path.splitext(os.path.abspath(path))[0].split(os.sep)[-2:])
+
+
 def load_scene(mi, path):
     """The scene, older files made loadable: filters that Mitsuba 3 lacks become bilinear, unused properties a warning."""
     mi.file_resolver().prepend(os.path.dirname(os.path.abspath(path)))
