@@ -18,7 +18,7 @@ use reprobe::transport::World;
 use std::path::Path;
 use timing::time;
 
-const RUNS: usize = 3;
+const RUNS: u32 = 3;
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
