@@ -6,7 +6,7 @@ use reprobe::probe::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
 use reprobe::probe::file::Probe;
 use reprobe::probe::qhmap::ParameterMap;
 use reprobe::progress::Silent;
-use reprobe::render::candidates::candidates;
+use reprobe::render::candidates::Candidates;
 use reprobe::render::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
 use reprobe::render::gbuffer::{GBuffer, gbuffer};
 use reprobe::render::mirror::{Reflected, mirror_hit};
@@ -80,7 +80,7 @@ impl Setup {
     }
 
     fn gather(&self, view: &GBuffer, reflected: &[Reflected], params: &GatherParams) -> Vec<Gathered> {
-        let candidates: Vec<_> = self.probes.iter().map(|p| candidates(&self.world.scene.geometry, p)).collect();
+        let candidates: Vec<_> = self.probes.iter().map(|p| Candidates::new(&self.world, p, Some(0.5))).collect();
         let probes = self.probes.iter().zip(&candidates).enumerate();
         let weighted: Vec<_> =
             probes.map(|(index, (probe, candidates))| WeightedProbe { index, probe, candidates, weight: 0.125 }).collect();

@@ -216,7 +216,7 @@ fn the_light_map_quantity_times_the_views_factor_is_the_diffuse_layer() {
         let surface = world.intersect(&ray).unwrap();
         let wi = surface.frame.to_local(-ray.d);
         let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(&surface, wi);
-        let stored = estimate(16384, 7, |s| transmitted_irradiance(&world, &surface, false, &params, s) * out * FRAC_1_PI);
+        let stored = estimate(16384, 7, |s| transmitted_irradiance(&world, &surface, false, None, &params, s) * out * FRAC_1_PI);
         let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
         let layer = estimate(16384, 8, |s| scattered(&world, &surface, -ray.d, query, None, &params, s));
         stored.assert_agrees(&layer, 0.02);
@@ -231,7 +231,7 @@ fn the_back_of_a_two_sided_wall_gathers_the_light_behind_it() {
     room.emit(lamp, Rgb::splat(2.0));
     let world = room.world();
     let surface = world.intersect(&Ray::new(Vec3::Y, Vec3::NEG_Y)).unwrap();
-    let gather = |back| estimate(4096, 9, |s| transmitted_irradiance(&world, &surface, back, &PathParams::default(), s));
+    let gather = |back| estimate(4096, 9, |s| transmitted_irradiance(&world, &surface, back, None, &PathParams::default(), s));
     gather(false).assert_is(Rgb::ZERO, 0.0);
     gather(true).assert_is(Rgb::splat(2.0 * PI), 0.02);
 }

@@ -2,19 +2,20 @@
 //!
 //! Ours: sides that face into a solid, and backs that no light reaches, are left out chart by chart. The work is one list
 //! of texels in blocks of [`BLOCK`], each a function of scene, parameters and seed alone: blocks can be done in any order,
-//! by any number of threads or machines, kept, and put together later.
+//! by any number of threads or machines, kept, and put together later. A first pass traces a few paths a texel in full; paths
+//! of the second read diffuse light from its map, one bounce away, where the mean over many texels hides their noise.
 
 use super::adjacency::adjacency;
 use super::parts::{Record, Store};
 use super::solid::{Orientation, mark_solids};
 use super::texels::Texels;
 use super::visible::{View, Visibility, facing};
-use super::{Atlas, AtlasParams, fill, seam};
+use super::{Atlas, AtlasParams, LightMap, fill, lookup, seam};
 use crate::math::{Rgb, hash_words};
 use crate::progress::Progress;
 use crate::scene::{Emitter, Scene};
 use crate::transport::bsdf::Lobes;
-use crate::transport::path::{PathParams, transmitted_irradiance};
+use crate::transport::path::{KnownDiffuse, PathParams, transmitted_irradiance};
 use crate::transport::{Sampler, Surface, World};
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
@@ -54,11 +55,13 @@ pub struct BakeParams {
     pub atlas: AtlasParams,
     /// Path length and roulette.
     pub path: PathParams,
+    /// Samples a texel of the first pass; 0: there is none, and every path is traced in full.
+    pub first_spp: u32,
 }
 
 impl Default for BakeParams {
     fn default() -> Self {
-        Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default() }
+        Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default(), first_spp: 0 }
     }
 }
 
@@ -86,6 +89,16 @@ pub struct Plan<'a> {
     items: Vec<(u32, bool)>,
 }
 
+/// One pass over all texels.
+#[derive(Clone, Copy)]
+pub struct Pass<'a> {
+    /// Samples a texel.
+    spp: u32,
+    seed: u32,
+    /// Where paths read diffuse light.
+    known: Option<&'a LightMap>,
+}
+
 impl<'a> Plan<'a> {
     /// Cuts the charts, finds the solids, and leaves out the sides that nobody sees or no light reaches.
     pub fn new(world: &'a World, params: &BakeParams, seed: u32) -> Result<Self> {
@@ -106,6 +119,17 @@ impl<'a> Plan<'a> {
             plan.items.extend(list.collect::<Vec<_>>());
         }
         Ok(plan)
+    }
+
+    /// The pass that traces a few paths in full, for the second to read its map; `None` if the second shall do without.
+    pub fn first_pass(&self) -> Option<Pass<'static>> {
+        let spp = self.params.first_spp;
+        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None })
+    }
+
+    /// The pass whose map counts; its paths read diffuse light from `known` and are traced in full without it.
+    pub fn second_pass<'k>(&self, known: Option<&'k LightMap>) -> Pass<'k> {
+        Pass { spp: self.params.spp, seed: self.seed, known }
     }
 
     /// Texel sides to bake.
@@ -132,8 +156,8 @@ impl<'a> Plan<'a> {
         self.items.chunks(BLOCK).nth(block as usize).unwrap_or_default()
     }
 
-    /// Bakes the blocks for which `mine` holds and which `store` does not have yet; returns how many it had.
-    pub fn run(&self, store: &dyn Store, mine: &dyn Fn(u32) -> bool, progress: &dyn Progress) -> Result<u32> {
+    /// Bakes a pass's blocks for which `mine` holds and which `store` does not have yet; returns how many it had.
+    pub fn run(&self, pass: &Pass, store: &dyn Store, mine: &dyn Fn(u32) -> bool, progress: &dyn Progress) -> Result<u32> {
         let blocks: Vec<u32> = (0..self.blocks()).filter(|&b| mine(b)).collect();
         progress.start("Light map", blocks.iter().map(|&b| self.block(b).len() as u64).sum());
         let mut found = 0;
@@ -147,7 +171,7 @@ impl<'a> Plan<'a> {
             let records: Vec<Record> = items
                 .par_iter()
                 .map(|&(texel, back)| {
-                    let record = self.texel(texel as usize, back);
+                    let record = self.texel(pass, texel as usize, back);
                     progress.advance(1);
                     record
                 })
@@ -161,6 +185,12 @@ impl<'a> Plan<'a> {
     /// Whether `store` has a finished block.
     pub fn has(&self, store: &dyn Store, block: u32) -> bool {
         store.has(block, self.block(block).len())
+    }
+
+    /// The finished map, ready for lookups.
+    pub fn map(&self, store: &dyn Store) -> Result<LightMap> {
+        let Baked { front, back } = self.assemble(store)?;
+        Ok(lookup::sides(&self.world.scene.geometry, &self.atlas, front, back))
     }
 
     /// Puts the blocks together: gutters, texels that nobody sees, seams.
@@ -236,21 +266,23 @@ impl<'a> Plan<'a> {
     }
 
     /// Sample `i` of a texel: its place and the rest of its random numbers.
-    fn draw(&self, texel: usize, back: bool, i: u32) -> (Surface, Sampler) {
-        let stream = hash_words(&[self.seed, u32::from(back), self.texels.pixel[texel]]);
+    fn draw(&self, pass: &Pass, texel: usize, back: bool, i: u32) -> (Surface, Sampler) {
+        let stream = hash_words(&[pass.seed, u32::from(back), self.texels.pixel[texel]]);
         let mut sampler = Sampler::new(stream, i);
         (self.visibility().sample(texel, sampler.next_2d()), sampler)
     }
 
-    fn light(&self, surface: &Surface, back: bool, mut sampler: Sampler) -> Rgb {
+    fn light(&self, pass: &Pass, surface: &Surface, back: bool, mut sampler: Sampler) -> Rgb {
+        let known = pass.known.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&self.world.scene, s, wo));
+        let known = known.as_ref().map(|known| known as KnownDiffuse);
         // The path starts with a set of dimensions of its own, whether the view was tested or not.
-        transmitted_irradiance(self.world, surface, back, &self.params.path, &mut sampler)
+        transmitted_irradiance(self.world, surface, back, known, &self.params.path, &mut sampler)
     }
 
     /// One texel's value and flags.
-    fn texel(&self, texel: usize, back: bool) -> Record {
+    fn texel(&self, pass: &Pass, texel: usize, back: bool) -> Record {
         let visibility = self.visibility();
-        let first: Vec<_> = (0..FIRST_SAMPLES).map(|i| self.draw(texel, back, i)).collect();
+        let first: Vec<_> = (0..FIRST_SAMPLES).map(|i| self.draw(pass, texel, back, i)).collect();
         let views: Vec<View> = first.iter().map(|(s, sampler)| visibility.view(s, back, &mut sampler.clone())).collect();
         let best = views.iter().max().copied().unwrap_or(View::Inside);
         if best == View::Inside {
@@ -259,19 +291,19 @@ impl<'a> Plan<'a> {
         let plain = views.iter().all(|&v| v == best)
             && (best == View::Contact || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
         if !plain {
-            return self.hidden_in_part(texel, back, best);
+            return self.hidden_in_part(pass, texel, back, best);
         }
-        let sum: Rgb = (0..self.params.spp)
+        let sum: Rgb = (0..pass.spp)
             .map(|i| {
-                let (surface, sampler) = self.draw(texel, back, i);
-                self.light(&surface, back, sampler)
+                let (surface, sampler) = self.draw(pass, texel, back, i);
+                self.light(pass, &surface, back, sampler)
             })
             .sum();
-        record(sum / self.params.spp as f32, if best == View::Open { OPEN } else { CONTACT })
+        record(sum / pass.spp as f32, if best == View::Open { OPEN } else { CONTACT })
     }
 
     /// A texel of which some samples are hidden, or lie in several regions: see [`super::visible`].
-    fn hidden_in_part(&self, texel: usize, back: bool, wanted: View) -> Record {
+    fn hidden_in_part(&self, pass: &Pass, texel: usize, back: bool, wanted: View) -> Record {
         struct Region {
             at: Surface,
             sum: Rgb,
@@ -280,8 +312,8 @@ impl<'a> Plan<'a> {
         let visibility = self.visibility();
         let mut regions: Vec<Region> = Vec::new();
         let mut count = 0;
-        for i in 0..self.params.spp.saturating_mul(TRIES).max(FIRST_SAMPLES) {
-            let (surface, mut sampler) = self.draw(texel, back, i);
+        for i in 0..pass.spp.saturating_mul(TRIES).max(FIRST_SAMPLES) {
+            let (surface, mut sampler) = self.draw(pass, texel, back, i);
             if visibility.view(&surface, back, &mut sampler) != wanted {
                 continue;
             }
@@ -291,10 +323,10 @@ impl<'a> Plan<'a> {
                 region = Some(regions.len() - 1);
             }
             let Some(region) = region else { continue };
-            regions[region].sum += self.light(&surface, back, sampler);
+            regions[region].sum += self.light(pass, &surface, back, sampler);
             regions[region].count += 1;
             count += 1;
-            if count >= self.params.spp {
+            if count >= pass.spp {
                 break;
             }
         }
@@ -321,6 +353,7 @@ impl<'a> Plan<'a> {
             let r: &mut (usize, usize) = &mut range[c as usize];
             *r = (r.0.min(i), i + 1);
         }
+        let pass = &self.second_pass(None);
         (0..self.atlas.charts.len())
             .into_par_iter()
             .map(|c| {
@@ -329,7 +362,7 @@ impl<'a> Plan<'a> {
                     return [false; 2];
                 }
                 let seen = |back: bool| {
-                    let (surface, _) = self.draw(start, back, 0);
+                    let (surface, _) = self.draw(pass, start, back, 0);
                     let outwards = f32::from(self.orientation[surface.triangle as usize]);
                     outwards * facing(&surface, back).dot(surface.ng) >= 0.0
                 };
@@ -338,8 +371,8 @@ impl<'a> Plan<'a> {
                 let lit = || {
                     (start..end).into_par_iter().step_by((end - start).div_ceil(LIT_TEXELS)).any(|t| {
                         (0..FIRST_SAMPLES).any(|i| {
-                            let (surface, sampler) = self.draw(t, true, i);
-                            self.light(&surface, true, sampler) != Rgb::ZERO
+                            let (surface, sampler) = self.draw(pass, t, true, i);
+                            self.light(pass, &surface, true, sampler) != Rgb::ZERO
                         })
                     })
                 };

@@ -1,8 +1,8 @@
 //! The bake against closed forms, and the three ways in which light maps leak.
 
-use super::bake::{BakeParams, Plan};
+use super::bake::{BakeParams, Pass, Plan};
 use super::parts::{Memory, Store};
-use super::{AtlasParams, LightMap, lookup, testing};
+use super::{AtlasParams, LightMap, testing};
 use crate::math::Rgb;
 use crate::progress::Silent;
 use crate::scene::{Camera, Emitter, Geometry, Material, Scene, Texture};
@@ -36,10 +36,13 @@ fn params(texel: f32, spp: u32) -> BakeParams {
 
 fn bake(world: &World, params: &BakeParams) -> LightMap {
     let plan = Plan::new(world, params, 1).unwrap();
-    let store = Memory::default();
-    plan.run(&store, &|_| true, &Silent).unwrap();
-    let baked = plan.assemble(&store).unwrap();
-    lookup::sides(&world.scene.geometry, &plan.atlas, baked.front, baked.back)
+    let map = |pass: &Pass| {
+        let store = Memory::default();
+        plan.run(pass, &store, &|_| true, &Silent).unwrap();
+        plan.map(&store).unwrap()
+    };
+    let first = plan.first_pass().map(|pass| map(&pass));
+    map(&plan.second_pass(first.as_ref()))
 }
 
 /// What the map says at the surface below (or above) `p`.
@@ -52,7 +55,9 @@ fn map_at(world: &World, map: &LightMap, p: Vec3, d: Vec3, back: bool) -> f32 {
 fn traced_at(world: &World, p: Vec3, d: Vec3, back: bool) -> f32 {
     let surface = world.intersect(&Ray::new(p, d)).unwrap();
     let n = 2048;
-    (0..n).map(|i| transmitted_irradiance(world, &surface, back, &PathParams::default(), &mut Sampler::new(9, i)).x).sum::<f32>()
+    (0..n)
+        .map(|i| transmitted_irradiance(world, &surface, back, None, &PathParams::default(), &mut Sampler::new(9, i)).x)
+        .sum::<f32>()
         / n as f32
 }
 
@@ -77,6 +82,29 @@ fn under_a_uniform_sky_a_convex_body_gets_pi_everywhere() {
     }
     mean /= count as f32;
     assert!(mean.abs() < 1e-3, "{mean}");
+}
+
+#[test]
+fn a_first_pass_finds_the_light_of_a_glowing_box_with_less_noise() {
+    // A closed box that sends out a radiance of 1 and scatters half of what comes in: E = π (1 + 1/2 + 1/4 + ...).
+    let mut g = Geometry::default();
+    testing::cuboid(&mut g, Vec3::ONE, Vec3::NEG_ONE);
+    g.objects[0].emitter = Some(0);
+    let emitter = Emitter::Area { object: 0, radiance: Texture::Constant(Rgb::ONE) };
+    let sensor = Some(Camera::look_at(Vec3::ZERO, Vec3::X, Vec3::Y, 1.0, [4, 4]));
+    let world = World::new(Scene { sensor, ..scene(g, diffuse(0.5), vec![emitter]) });
+    let errors = |first_spp: u32| {
+        let map = bake(&world, &BakeParams { first_spp, ..params(0.25, 16) });
+        let places = (0..12).flat_map(|t| [Vec2::splat(0.3), Vec2::new(0.7, 0.2), Vec2::new(0.1, 0.8)].map(|b| (t, b)));
+        let errors: Vec<f32> = places.map(|(t, b)| map.lookup(t, b, false).x / (2.0 * PI) - 1.0).collect();
+        let n = errors.len() as f32;
+        (errors.iter().sum::<f32>() / n, errors.iter().map(|e| e * e).sum::<f32>() / n)
+    };
+    let ((full_mean, full), (mean, square)) = (errors(0), errors(8));
+    assert!(square < 0.5 * full, "{square} against {full} with full paths");
+    for (mean, square) in [(full_mean, full), (mean, square)] {
+        assert!(mean.abs() < 4.0 * (square / 36.0).sqrt(), "mean {mean}, root mean square {}", square.sqrt());
+    }
 }
 
 /// Irradiance at `p` with normal `n` from a Lambertian polygon of unit radiance (Lambert 1760); no horizon clipping.
@@ -149,7 +177,9 @@ fn without_the_visibility_tests_the_box_would_leak() {
     let world = box_on_floor(-0.05);
     let surface = |x: f32| world.intersect(&Ray::new(Vec3::new(x, 0.02, 0.1), Vec3::NEG_Y)).unwrap();
     let light = |s: &Surface| {
-        (0..256).map(|i| transmitted_irradiance(&world, s, false, &PathParams::default(), &mut Sampler::new(3, i)).x).sum::<f32>()
+        (0..256)
+            .map(|i| transmitted_irradiance(&world, s, false, None, &PathParams::default(), &mut Sampler::new(3, i)).x)
+            .sum::<f32>()
             / 256.0
     };
     let plain = (0..10).map(|i| light(&surface(0.405 + 0.01 * i as f32))).sum::<f32>() / 10.0;
@@ -249,20 +279,24 @@ fn shards_and_threads_and_taking_up_a_killed_bake_change_no_bit() {
     let plan = Plan::new(&world, &params, 7).unwrap();
     assert!(plan.blocks() >= 3, "{} blocks", plan.blocks());
     let whole = Memory::default();
-    plan.run(&whole, &|_| true, &Silent).unwrap();
+    plan.run(&plan.second_pass(None), &whole, &|_| true, &Silent).unwrap();
     let expected = plan.assemble(&whole).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let parts = Memory::default();
     pool.install(|| {
         let plan = Plan::new(&world, &params, 7).unwrap();
         assert!(plan.assemble(&parts).is_err(), "blocks are missing");
-        assert_eq!(plan.run(&parts, &|b| b % 2 == 1, &Silent).unwrap(), 0);
-        assert_eq!(plan.run(&parts, &|_| true, &Silent).unwrap(), plan.blocks() / 2, "finished blocks are kept");
+        assert_eq!(plan.run(&plan.second_pass(None), &parts, &|b| b % 2 == 1, &Silent).unwrap(), 0);
+        assert_eq!(
+            plan.run(&plan.second_pass(None), &parts, &|_| true, &Silent).unwrap(),
+            plan.blocks() / 2,
+            "finished blocks are kept"
+        );
         assert_eq!(plan.assemble(&parts).unwrap(), expected);
     });
     assert!(parts.get(0, 1).is_none());
     let other = Plan::new(&world, &params, 8).unwrap();
     let store = Memory::default();
-    other.run(&store, &|_| true, &Silent).unwrap();
+    other.run(&other.second_pass(None), &store, &|_| true, &Silent).unwrap();
     assert_ne!(other.assemble(&store).unwrap(), expected, "the seed counts");
 }

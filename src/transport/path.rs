@@ -101,9 +101,16 @@ pub fn scattered(
 
 /// Incident, not scattered light: one sample of the light map's quantity ∫ T_in(ω) L(ω) cos θ dω at `surface`, on the side of
 /// `frame.n` (or its back with `back`), with T_in = [`super::bsdf::Bsdf::diffuse_in`]. L holds all paths, direct light included.
-pub fn transmitted_irradiance(world: &World, surface: &Surface, back: bool, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+pub fn transmitted_irradiance(
+    world: &World,
+    surface: &Surface,
+    back: bool,
+    known: Option<KnownDiffuse>,
+    params: &PathParams,
+    sampler: &mut Sampler,
+) -> Rgb {
     let measure = Measure::Irradiance { side: if back { -1.0 } else { 1.0 } };
-    integrate(&Vertex { world, surface, measure }, None, params, sampler)
+    integrate(&Vertex { world, surface, measure }, known, params, sampler)
 }
 
 /// Radiance arriving from the far end of `ray`, emission included, without a split.

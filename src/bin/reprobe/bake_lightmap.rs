@@ -34,6 +34,9 @@ pub struct Args {
     /// About how many texels the surfaces get in all
     #[arg(long, value_name = "N", default_value_t = AtlasParams::default().budget, conflicts_with = "texel", value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
     texels: u32,
+    /// Samples a texel of a first pass, from whose map the paths of the second read diffuse light; 0: trace every path in full
+    #[arg(long, value_name = "N", default_value_t = BakeParams::default().first_spp, value_parser = clap::value_parser!(u32).range(0..=1 << 24))]
+    first_spp: u32,
     /// Bake blocks I, I+N, I+2N, ... only; the shard that completes them writes the map
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     shard: Option<Shard>,
@@ -47,7 +50,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let world = common.opaque_world(&args.scene)?;
     let loaded = began.elapsed().as_secs_f64();
     let atlas = AtlasParams { texel: args.texel, budget: args.texels };
-    let params = BakeParams { spp: args.spp, atlas, ..Default::default() };
+    let params = BakeParams { spp: args.spp, atlas, first_spp: args.first_spp, ..Default::default() };
     let provenance = Provenance::new("bake-lightmap", &world.scene.hash, common.seed, &params);
     if ExrImage::read_provenance(&args.output).is_ok_and(|found| found.as_ref() == Some(&provenance)) {
         let summary = format!("{}: up to date", args.output.display());
@@ -55,14 +58,24 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     }
     let plan = Plan::new(&world, &params, common.seed)?;
     let atlas = &plan.atlas;
-    let store = Folder::new(&parts_folder(&args.output), &serde_json::to_string(&provenance)?);
+    let key = serde_json::to_string(&provenance)?;
+    let [first_store, store] = [".first.parts", ".parts"].map(|ending| Folder::new(&beside(&args.output, ending), &key));
 
     let planned = began.elapsed().as_secs_f64() - loaded;
+    let first = match plan.first_pass() {
+        // Every shard needs all of it.
+        Some(pass) => {
+            plan.run(&pass, &first_store, &|_| true, &common.progress())?;
+            Some(plan.map(&first_store)?)
+        }
+        None => None,
+    };
     let mine = |b: u32| args.shard.is_none_or(|s| s.has(b));
-    let kept = plan.run(&store, &mine, &common.progress())?;
+    let kept = plan.run(&plan.second_pass(first.as_ref()), &store, &mine, &common.progress())?;
     let missing = (0..plan.blocks()).filter(|&b| !mine(b) && !plan.has(&store, b)).count();
     if missing == 0 {
         write(&plan, &world, &store, provenance, &args.output)?;
+        first_store.remove()?;
     }
     let seconds = began.elapsed().as_secs_f64();
     let [width, height] = atlas.size;
@@ -88,9 +101,10 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     })
 }
 
-fn parts_folder(output: &Path) -> PathBuf {
+/// The output's path with an ending more.
+fn beside(output: &Path, ending: &str) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
-    name.push(".parts");
+    name.push(ending);
     name.into()
 }
 

@@ -94,6 +94,7 @@ struct Settings {
     probe_size: [u32; 2],
     spp: u32,
     lightmap_spp: u32,
+    lightmap_first_spp: u32,
     lightmap_texels: u32,
     size: [u32; 2],
     supersample: u32,
@@ -109,6 +110,7 @@ impl Preset {
                 probe_size: [256, 128],
                 spp: 64,
                 lightmap_spp: 96,
+                lightmap_first_spp: 12,
                 lightmap_texels: 150_000,
                 size: [320, 180],
                 supersample: 2,
@@ -120,6 +122,7 @@ impl Preset {
                 probe_size: [512, 256],
                 spp: 128,
                 lightmap_spp: 128,
+                lightmap_first_spp: 16,
                 lightmap_texels: 1_000_000,
                 size: [480, 270],
                 supersample: 2,
@@ -131,6 +134,7 @@ impl Preset {
                 probe_size: [1024, 512],
                 spp: 2048,
                 lightmap_spp: 2048,
+                lightmap_first_spp: 0,
                 lightmap_texels: 4_000_000,
                 size: [1920, 1080],
                 supersample: 1,
@@ -253,6 +257,7 @@ fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage
         stage("curvature").option("--output", out("curvature.exr").display()),
         stage("bake-lightmap")
             .option("--spp", args.lightmap_spp.unwrap_or(preset.lightmap_spp))
+            .option("--first-spp", if args.paper { 0 } else { preset.lightmap_first_spp })
             .optional("--texels", args.texel.is_none().then_some(preset.lightmap_texels))
             .optional("--texel", args.texel)
             .option("--output", out("lightmap.exr").display()),
