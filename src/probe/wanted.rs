@@ -20,15 +20,11 @@ use crate::transport::World;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A probe's geometry, and which of its texels are fetched.
-pub struct Wanted {
-    /// Reflector and reflected maps; black glossy map.
-    pub probe: Probe,
-    /// One flag a texel.
-    pub texels: Vec<bool>,
-}
+/// Which texels of which probes are fetched: a flag a texel, by the probe's index.
+pub type Wanted = BTreeMap<usize, Vec<bool>>;
 
 /// The views that a partial bake serves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,7 +61,7 @@ impl Views {
     }
 }
 
-/// Runs the gather of every view on the probes' geometry. The result holds the probes that the views use, by index.
+/// Runs the gather of every view on the probes' geometry, of which only what the view at hand uses is in memory.
 pub fn wanted_texels(
     world: &World,
     curvature: &CurvatureMap,
@@ -74,21 +70,22 @@ pub fn wanted_texels(
     cameras: &[Camera],
     views: &Views,
     progress: &dyn Progress,
-) -> Result<BTreeMap<usize, Wanted>> {
-    let mut probes: BTreeMap<usize, (Probe, Vec<AtomicBool>)> = BTreeMap::new();
+) -> Result<Wanted> {
+    let mut wanted: BTreeMap<usize, Vec<AtomicBool>> = BTreeMap::new();
+    let mut probes: BTreeMap<usize, Probe> = BTreeMap::new();
     let mut candidates = NearCandidates::default();
     progress.start("texels that the views use", cameras.len() as u64);
     for camera in cameras {
         let near = nearest_probes(grid, camera.position(), views.gather.probes);
+        probes.retain(|index, _| near.iter().any(|(i, _)| i == index));
         for &(index, _) in &near {
-            if let std::collections::btree_map::Entry::Vacant(entry) = probes.entry(index) {
-                let probe = probe_geometry(world, grid.position(index), map(index)?);
-                let flags = probe.texels.iter().map(|_| AtomicBool::new(false)).collect();
-                entry.insert((probe, flags));
+            if let Entry::Vacant(entry) = probes.entry(index) {
+                let probe = entry.insert(probe_geometry(world, grid.position(index), map(index)?));
+                wanted.entry(index).or_insert_with(|| probe.texels.iter().map(|_| AtomicBool::new(false)).collect());
             }
         }
-        let near: Vec<_> = near.iter().map(|&(index, weight)| (index, &probes[&index].0, weight)).collect();
-        let weighted = candidates.of(&world.scene.geometry, &near);
+        let near: Vec<_> = near.iter().map(|&(index, weight)| (index, &probes[&index], weight)).collect();
+        let weighted = candidates.of(world, &near, None);
         let fine = Camera { size: camera.size.map(|s| s * views.supersample), ..camera.clone() };
         let view = gbuffer(world, curvature, &fine);
         let reflected = mirror_pass(world, &view);
@@ -98,7 +95,7 @@ pub fn wanted_texels(
                 for (w, sample) in weighted.iter().zip(samples) {
                     let Some(sample) = sample else { continue };
                     for texel in footprint_texels(w.probe, sample.texel) {
-                        probes[&w.index].1[texel].store(true, Ordering::Relaxed);
+                        wanted[&w.index][texel].store(true, Ordering::Relaxed);
                     }
                 }
             }
@@ -106,8 +103,6 @@ pub fn wanted_texels(
         progress.advance(1);
     }
     progress.finish();
-    let done = |(index, (probe, flags)): (usize, (Probe, Vec<AtomicBool>))| {
-        (index, Wanted { probe, texels: flags.into_iter().map(AtomicBool::into_inner).collect() })
-    };
-    Ok(probes.into_iter().map(done).collect())
+    let flags = |flags: Vec<AtomicBool>| flags.into_iter().map(AtomicBool::into_inner).collect();
+    Ok(wanted.into_iter().map(|(index, texels)| (index, flags(texels))).collect())
 }

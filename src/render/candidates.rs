@@ -1,50 +1,116 @@
-//! What the search over a probe's texels compares, made ready: a candidate is one record to read, without arithmetic.
+//! A probe's texels, made ready for the gather: what it reads most often lies closest together.
 
-use super::gather::{Reflection, WeightedProbe};
+use super::gather::WeightedProbe;
+use super::mirror::Reflected;
+use crate::math::Rgb;
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
-use crate::scene::Geometry;
+use crate::transport::bsdf::{Lobes, Query};
+use crate::transport::{Hit, World};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// [`Candidate::material`] and [`Candidate::object`] of a texel that sees no surface.
-pub const NO_SURFACE: u32 = u32::MAX;
+/// [`Seen::material`] of a texel that sees no surface.
+const NO_SURFACE: u16 = u16::MAX;
 
-/// A texel of a probe, as the gather sees it.
+/// A probe's texels as the gather sees them, an entry a texel in each list. 72 bytes a texel in all.
+#[derive(Default)]
+pub struct Candidates {
+    /// What rules most texels out.
+    pub seen: Vec<Seen>,
+    /// What the energy compares besides.
+    pub directions: Vec<Directions>,
+    /// What is fetched in the end.
+    pub light: Vec<Light>,
+}
+
+/// The reflector's material, and what a mirror there shows.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(16))]
-pub struct Candidate {
-    /// What the energy compares.
-    pub reflection: Reflection,
+pub struct Seen {
+    reflected_point: Vec3,
+    reflected_material: u16,
     /// Material of the reflector.
-    pub material: u32,
+    pub material: u16,
+}
+
+impl Seen {
+    /// R.
+    #[inline]
+    pub fn reflected(&self) -> Reflected {
+        Reflected { point: self.reflected_point, material: self.reflected_material }
+    }
+}
+
+/// The reflector's normal, and the direction from it to what it reflects.
+#[derive(Debug, Clone, Copy)]
+pub struct Directions {
+    /// n, unit shading normal facing the probe; zero where there is no surface.
+    pub normal: Vec3,
+    /// Unit direction of the reflected ray.
+    pub reflected: Vec3,
+}
+
+/// Colour, and what decides whether it may be blended.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(16))]
+pub struct Light {
+    /// Glossy radiance.
+    pub glossy: Rgb,
     /// Object of the reflector.
     pub object: u32,
+    /// Directional albedo of the reflector's non-diffuse lobe towards the probe, at the probe's roughness; 1 where nobody asked.
+    pub albedo: Rgb,
+    /// Material of the reflected hit.
+    pub reflected_material: u16,
 }
 
-/// The candidates of a probe, one a texel.
-pub fn candidates(geometry: &Geometry, probe: &Probe) -> Vec<Candidate> {
-    let width = probe.size[0] as usize;
-    probe.texels.par_iter().with_min_len(width).map(|texel| candidate(geometry, texel, probe.position)).collect()
-}
-
-fn candidate(geometry: &Geometry, texel: &Texel, eye: Vec3) -> Candidate {
-    let reflected = texel.reflected();
-    if texel.triangle == NO_TRIANGLE {
-        let reflection = Reflection { normal: Vec3::ZERO, direction: Vec3::ZERO, reflected };
-        return Candidate { reflection, material: NO_SURFACE, object: NO_SURFACE };
-    }
-    let (position, normal) = reflector(geometry, texel, eye);
-    let object = geometry.triangle_object[texel.triangle as usize];
-    Candidate {
-        reflection: Reflection { normal, direction: reflected.direction_from(position), reflected },
-        material: geometry.objects[object as usize].material,
-        object,
+impl Candidates {
+    /// The candidates of a probe; with albedos where the scale of roughness that it was baked at is given.
+    pub fn new(world: &World, probe: &Probe, roughness_scale: Option<f32>) -> Self {
+        let width = probe.size[0] as usize;
+        let rows = || probe.texels.par_iter().with_min_len(width);
+        let reflectors: Vec<_> = rows().map(|texel| reflector(world, texel, probe.position)).collect();
+        let with_reflectors = || rows().zip(&reflectors);
+        let material = |object: u32| world.scene.geometry.objects[object as usize].material as u16;
+        let seen = |(texel, r): (&Texel, &Option<Reflector>)| {
+            let Reflected { point: reflected_point, material: reflected_material } = texel.reflected();
+            Seen { reflected_point, reflected_material, material: r.as_ref().map_or(NO_SURFACE, |r| material(r.object)) }
+        };
+        let directions = |(texel, r): (&Texel, &Option<Reflector>)| match r {
+            Some(r) => Directions { normal: r.normal, reflected: texel.reflected().direction_from(r.position) },
+            None => Directions { normal: Vec3::ZERO, reflected: Vec3::ZERO },
+        };
+        let light = |(texel, r): (&Texel, &Option<Reflector>)| {
+            let albedo =
+                if r.is_some() { roughness_scale.map(|scale| albedo(world, texel, probe.position, scale)) } else { None };
+            Light {
+                glossy: texel.glossy(),
+                albedo: albedo.unwrap_or(Rgb::ONE),
+                reflected_material: texel.reflected_material,
+                object: r.as_ref().map_or(u32::MAX, |r| r.object),
+            }
+        };
+        Self {
+            seen: with_reflectors().map(seen).collect(),
+            directions: with_reflectors().map(directions).collect(),
+            light: with_reflectors().map(light).collect(),
+        }
     }
 }
 
 /// r_p and n_p of a texel: position, and shading normal facing the probe.
-fn reflector(geometry: &Geometry, texel: &Texel, eye: Vec3) -> (Vec3, Vec3) {
+struct Reflector {
+    position: Vec3,
+    normal: Vec3,
+    object: u32,
+}
+
+fn reflector(world: &World, texel: &Texel, eye: Vec3) -> Option<Reflector> {
+    if texel.triangle == NO_TRIANGLE {
+        return None;
+    }
+    let geometry = &world.scene.geometry;
     let b = texel.barycentric();
     let weights = [1.0 - b.x - b.y, b.x, b.y];
     let [i, j, k] = geometry.triangles[texel.triangle as usize].map(|v| v as usize);
@@ -54,20 +120,35 @@ fn reflector(geometry: &Geometry, texel: &Texel, eye: Vec3) -> (Vec3, Vec3) {
     let n = if geometry.object(texel.triangle).face_normals { ng } else { mix(&geometry.normals) };
     let n = n.try_normalize().unwrap_or(Vec3::Y);
     let eye_side = ng.dot(eye - position) * ng.dot(n);
-    (position, if eye_side < 0.0 { -n } else { n })
+    let object = geometry.triangle_object[texel.triangle as usize];
+    Some(Reflector { position, normal: if eye_side < 0.0 { -n } else { n }, object })
 }
 
-/// The candidates of the probes around the camera, for as long as they are around it: quickly made, and twice the probe's memory.
+/// Directional albedo of a texel's non-diffuse lobe towards the probe.
+fn albedo(world: &World, texel: &Texel, eye: Vec3, roughness_scale: f32) -> Rgb {
+    let b = texel.barycentric();
+    let surface = world.surface(&Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
+    let wo = (eye - surface.p).try_normalize().unwrap_or(surface.frame.n);
+    let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
+    world.scene.materials[surface.material as usize].bsdf.glossy_albedo(&surface, surface.frame.to_local(wo), query)
+}
+
+/// The candidates of the probes around the camera, for as long as they are around it: quickly made, and more memory than the probe.
 #[derive(Default)]
-pub struct NearCandidates(BTreeMap<usize, Vec<Candidate>>);
+pub struct NearCandidates(BTreeMap<usize, Candidates>);
 
 impl NearCandidates {
     /// The probes `near` the camera (index, probe, weight), ready for the gather. Makes the candidates that are missing, and drops
-    /// those of all other probes.
-    pub fn of<'a>(&'a mut self, geometry: &Geometry, near: &[(usize, &'a Probe, f32)]) -> Vec<WeightedProbe<'a>> {
+    /// those of all other probes. Always to be called with the same `roughness_scale`: [`Candidates::new`]'s.
+    pub fn of<'a>(
+        &'a mut self,
+        world: &World,
+        near: &[(usize, &'a Probe, f32)],
+        roughness_scale: Option<f32>,
+    ) -> Vec<WeightedProbe<'a>> {
         self.0.retain(|index, _| near.iter().any(|(i, ..)| i == index));
         for &(index, probe, _) in near {
-            self.0.entry(index).or_insert_with(|| candidates(geometry, probe));
+            self.0.entry(index).or_insert_with(|| Candidates::new(world, probe, roughness_scale));
         }
         let of = |&(index, probe, weight)| WeightedProbe { index, probe, candidates: &self.0[&index], weight };
         near.iter().map(of).collect()

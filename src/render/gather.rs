@@ -5,23 +5,26 @@
 //!
 //! *Ours*: colour is fetched at the fractional coordinate, geometry at the texel that holds it.
 
-use super::candidates::Candidate;
+use super::candidates::Candidates;
 use super::gbuffer::{GBuffer, Pixel};
 use super::mirror::{NOTHING, Reflected};
 use super::perturb::{PerturbParams, Perturbation};
 use crate::math::{Rgb, floor, fraction};
-use crate::probe::file::{Probe, Texel};
-use crate::transport::bsdf::{Bsdf, Lobes, Query};
-use crate::transport::{Hit, World};
+use crate::probe::file::Probe;
+use crate::transport::World;
+use crate::transport::bsdf::{Lobes, Query};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+
+/// Most samples to each side of a search's centre.
+pub const MAX_RADIUS: i32 = 15;
 
 /// One level of the neighbour search: (2 radius + 1)² samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SearchLevel {
-    /// Samples to each side of the centre.
+    /// Samples to each side of the centre; more than [`MAX_RADIUS`] count as that.
     pub radius: i32,
     /// Distance between samples, texels of an undistorted map; scaled by the map's derivative.
     pub step: f32,
@@ -101,35 +104,10 @@ impl GatherParams {
     }
 }
 
-/// What the energy compares: the reflector's normal n, the reflected ray and its hit R, in the probe or in the view.
-#[derive(Debug, Clone, Copy)]
-pub struct Reflection {
-    /// n, unit shading normal facing the viewer.
-    pub normal: Vec3,
-    /// Unit direction of the reflected ray, from the reflector's position r to R.
-    pub direction: Vec3,
-    /// R, what a mirror there shows.
-    pub reflected: Reflected,
-}
-
-/// s_b: distance of the reflected hits, m. Two hits at infinity differ by the chord between their directions, as at a distance
-/// of 1 m; one at infinity and one not are as far apart as the energy can say.
+/// s_b: distance of the reflected hits, m, at most 1. Two hits at infinity differ by the chord between their directions, as at a
+/// distance of 1 m; one at infinity and one not are as far apart as the energy can say.
 fn reflected_distance(view: &Reflected, probe: &Reflected) -> f32 {
-    if view.is_sky() == probe.is_sky() { view.point.distance(probe.point) } else { 1.0 }
-}
-
-/// E of Eq. 1, how badly a probe's sample stands in for the view's, where it is below `limit`. Zero is a perfect match; at most 3 s_a.
-fn energy_below(limit: f32, view: &Reflection, probe: &Reflection, material_penalty: f32) -> Option<f32> {
-    let s_a = if view.reflected.material == probe.reflected.material { 1.0 } else { material_penalty };
-    let s_b = reflected_distance(&view.reflected, &probe.reflected).min(1.0);
-    // The reflected hit alone rules most texels out.
-    if s_a * s_b >= limit {
-        return None;
-    }
-    let s_c = 1.0 - view.normal.dot(probe.normal);
-    let s_d = 1.0 - view.direction.dot(probe.direction);
-    let energy = s_a * (s_b + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0));
-    (energy < limit).then_some(energy)
+    if view.is_sky() == probe.is_sky() { view.point.distance(probe.point).min(1.0) } else { 1.0 }
 }
 
 /// Side of a tile of pixels: what their searches read of a probe, some 100 KB, fits into a core's cache.
@@ -161,7 +139,7 @@ pub struct WeightedProbe<'a> {
     /// The probe.
     pub probe: &'a Probe,
     /// Its texels, ready for the search.
-    pub candidates: &'a [Candidate],
+    pub candidates: &'a Candidates,
     /// t_i.
     pub weight: f32,
 }
@@ -234,10 +212,10 @@ pub fn best_samples(
         .map(|&(i, pixel)| {
             let reflected = reflected[i];
             let (r, n) = (pixel.surface.p, pixel.normal);
-            let at_view = Reflection { normal: n, direction: reflected.direction_from(r), reflected };
+            let direction = reflected.direction_from(r);
             let distance = reflected.distance_from(r);
             let path = Perturbation::new(eye, r, n, distance, &pixel.curvature, &params.perturb);
-            (Target { at_view, material: pixel.surface.material }, path)
+            (Target { normal: n, direction, reflected, material: pixel.surface.material }, path)
         })
         .collect();
     let step = params.anchors.max(1);
@@ -269,9 +247,15 @@ pub fn best_samples(
     samples
 }
 
-/// What a search looks for.
+/// What a search looks for: what the energy compares, at the view.
 struct Target {
-    at_view: Reflection,
+    /// n, unit shading normal facing the viewer.
+    normal: Vec3,
+    /// Unit direction of the reflected ray, from the reflector's position r to R.
+    direction: Vec3,
+    /// R, what a mirror there shows.
+    reflected: Reflected,
+    /// Material of the reflector.
     material: u32,
 }
 
@@ -312,12 +296,12 @@ fn blend(
     };
     // exp(-φ E_min) is cancelled against Z, so that it cannot underflow.
     let (mut sum, mut z) = (Rgb::ZERO, 0.0);
-    let ratio = params.albedo_ratio.then(|| AlbedoRatio::new(world, pixel, roughness_scale));
+    let albedo = params.albedo_ratio.then(|| view_albedo(world, pixel, roughness_scale));
     for (w, sample) in found() {
         let weight = w.weight.max(MIN_TRILINEAR) * (-params.falloff * (sample.energy - best.energy)).exp();
         let mut color = fetch(w, sample.texel, params.bilinear);
-        if let Some(ratio) = &ratio {
-            color *= ratio.over(w.probe, w.probe.texel(sample.texel));
+        if let Some(view) = albedo {
+            color *= albedo_ratio(view, w, sample.texel);
         }
         sum += color * weight;
         z += weight;
@@ -337,12 +321,23 @@ impl WeightedProbe<'_> {
         (x - self.probe.position).try_normalize().map(|d| self.probe.map.texel_from_direction(d))
     }
 
-    /// [`energy_below`] of a texel, whose reflector must be of the target's material.
+    /// E of Eq. 1, how badly a texel stands in for the target, where it is below `limit` and the reflectors are of one material.
+    /// Zero is a perfect match; at most 3 s_a.
     #[inline]
     fn energy_below(&self, limit: f32, texel: usize, target: &Target, params: &GatherParams) -> Option<f32> {
-        let candidate = &self.candidates[texel];
-        let same = candidate.material == target.material;
-        same.then(|| energy_below(limit, &target.at_view, &candidate.reflection, params.material_penalty)).flatten()
+        let seen = &self.candidates.seen[texel];
+        let reflected = seen.reflected();
+        let s_a = if target.reflected.material == reflected.material { 1.0 } else { params.material_penalty };
+        let s_b = reflected_distance(&target.reflected, &reflected);
+        // The reflected hit alone rules most texels out.
+        if u32::from(seen.material) != target.material || s_a * s_b >= limit {
+            return None;
+        }
+        let directions = &self.candidates.directions[texel];
+        let s_c = 1.0 - target.normal.dot(directions.normal);
+        let s_d = 1.0 - target.direction.dot(directions.reflected);
+        let energy = s_a * (s_b + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0));
+        (energy < limit).then_some(energy)
     }
 }
 
@@ -360,12 +355,17 @@ fn search(
     let (mut least, mut found) = known.map_or((f32::INFINITY, centre), |s| (s.energy, s.texel));
     for level in levels {
         let step = probe.map.search_scale(centre) * level.step;
-        for j in -level.radius..=level.radius {
+        let radius = level.radius.min(MAX_RADIUS);
+        let mut columns = [(0.0, 0); 2 * MAX_RADIUS as usize + 1];
+        for (i, column) in (-radius..=radius).zip(&mut columns) {
+            let x = centre.x + step.x * i as f32;
+            *column = (x, probe.column(floor(x)));
+        }
+        for j in -radius..=radius {
             let y = centre.y + step.y * j as f32;
             let row = probe.row(floor(y));
-            for i in -level.radius..=level.radius {
-                let x = centre.x + step.x * i as f32;
-                if let Some(energy) = w.energy_below(least, row + probe.column(floor(x)), target, params) {
+            for &(x, column) in &columns[..(2 * radius + 1).max(0) as usize] {
+                if let Some(energy) = w.energy_below(least, row + column, target, params) {
                     least = energy;
                     found = Vec2::new(x, y);
                 }
@@ -381,18 +381,19 @@ fn search(
 
 /// Colour at a fractional texel coordinate, bilinear over those of the four texels around it that `rule` lets in.
 fn fetch(w: &WeightedProbe, at: Vec2, rule: BilinearRule) -> Rgb {
+    let light = &w.candidates.light;
+    let centre = &light[w.probe.index_at(at)];
     if rule == BilinearRule::Nearest {
-        return w.probe.texel(at).glossy();
+        return centre.glossy;
     }
-    let centre = &w.candidates[w.probe.index_at(at)];
     let f = fraction(at - 0.5);
     let (mut sum, mut total) = (Rgb::ZERO, 0.0);
     let weights = [(1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y];
     for (i, weight) in footprint_texels(w.probe, at).into_iter().zip(weights) {
-        let candidate = &w.candidates[i];
-        let same_reflected = candidate.reflection.reflected.material == centre.reflection.reflected.material;
-        if candidate.object == centre.object && (rule == BilinearRule::SameReflector || same_reflected) {
-            sum += w.probe.texels[i].glossy() * weight;
+        let tap = &light[i];
+        let same_reflected = tap.reflected_material == centre.reflected_material;
+        if tap.object == centre.object && (rule == BilinearRule::SameReflector || same_reflected) {
+            sum += tap.glossy * weight;
             total += weight;
         }
     }
@@ -402,26 +403,13 @@ fn fetch(w: &WeightedProbe, at: Vec2, rule: BilinearRule) -> Rgb {
 
 /// Directional albedo of the non-diffuse lobe in the view over that at a probe's sample, both at the probes' roughness:
 /// carries Fresnel and the specular texture over from one to the other. Clamped, as a ratio of small numbers says little.
-struct AlbedoRatio<'a> {
-    world: &'a World,
-    bsdf: &'a Bsdf,
-    query: Query,
-    view: Rgb,
+fn albedo_ratio(view: Rgb, w: &WeightedProbe, at: Vec2) -> Rgb {
+    let probe = w.candidates.light[w.probe.index_at(at)].albedo;
+    (view / probe.max(Rgb::splat(1e-4))).clamp(Rgb::splat(0.25), Rgb::splat(4.0))
 }
 
-impl<'a> AlbedoRatio<'a> {
-    fn new(world: &'a World, pixel: &Pixel, roughness_scale: f32) -> Self {
-        let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
-        let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
-        let view = bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query);
-        Self { world, bsdf, query, view }
-    }
-
-    fn over(&self, probe: &Probe, texel: &Texel) -> Rgb {
-        let b = texel.barycentric();
-        let there = self.world.surface(&Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
-        let Some(wo) = (probe.position - there.p).try_normalize() else { return Rgb::ONE };
-        let probe = self.bsdf.glossy_albedo(&there, there.frame.to_local(wo), self.query);
-        (self.view / probe.max(Rgb::splat(1e-4))).clamp(Rgb::splat(0.25), Rgb::splat(4.0))
-    }
+fn view_albedo(world: &World, pixel: &Pixel, roughness_scale: f32) -> Rgb {
+    let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
+    let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
+    bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query)
 }

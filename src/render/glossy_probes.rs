@@ -126,13 +126,14 @@ impl<'a> Renderer<'a> {
             .map(|(index, weight)| Ok((index, probes.probe(index)?, weight)))
             .collect::<Result<_>>()?;
         let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
-        let weighted = self.candidates.of(&self.world.scene.geometry, &near);
+        let roughness_scale = probes.set.roughness_scale;
+        let albedos = self.params.gather.albedo_ratio.then_some(roughness_scale);
+        let weighted = self.candidates.of(self.world, &near, albedos);
         clock.lap("load");
         let view = Arc::new(gbuffer(self.world, self.curvature, &fine));
         clock.lap("gbuffer");
         let reflected = mirror_pass(self.world, &view);
         clock.lap("mirror");
-        let roughness_scale = probes.set.roughness_scale;
         let mut gathered = gather(self.world, &view, &reflected, &weighted, roughness_scale, &self.params.gather);
         let unserved = reproject_previous(&view, &mut gathered, self.previous.as_ref());
         clock.lap("gather");

@@ -18,7 +18,6 @@ use reprobe::progress::Progress;
 use reprobe::render::glossy_probes::GlossyProbeParams;
 use reprobe::surface::curvature_file;
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -151,7 +150,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let baked = todo.len();
     let lightmap = args.lightmap.as_ref().map(|file| LightMap::load(file, scene)).transpose()?;
     let shared = Bake { world: &world, params: &params, seed: common.seed, lightmap: lightmap.as_ref() };
-    let traced = bake(args, &shared, &maps, &grid, &provenance, todo, wanted, &progress)?;
+    let traced = bake(args, &shared, &maps, &grid, &provenance, todo, wanted.as_ref(), &progress)?;
 
     let missing = needed.iter().filter(|&&i| !finished(i)).count();
     if missing == 0 {
@@ -191,18 +190,16 @@ fn bake(
     grid: &ProbeGrid,
     provenance: &Provenance,
     todo: Vec<usize>,
-    mut wanted: Option<BTreeMap<usize, Wanted>>,
+    wanted: Option<&Wanted>,
     progress: &dyn Progress,
 ) -> anyhow::Result<Traced> {
     let rows = maps.size[1] as u64;
     progress.start("probes", todo.len() as u64 * rows);
     let mut traced = Traced::default();
     for index in todo {
-        let (mut probe, flags) = match wanted.as_mut().and_then(|w| w.remove(&index)) {
-            Some(w) => (w.probe, Some(w.texels)),
-            None => (probe_geometry(shared.world, grid.position(index), ParameterMap::load(&args.qhmap, index)?.0), None),
-        };
-        let want = |i: u32| flags.as_ref().is_none_or(|f| f[i as usize]);
+        let mut probe = probe_geometry(shared.world, grid.position(index), ParameterMap::load(&args.qhmap, index)?.0);
+        let flags = wanted.as_ref().and_then(|w| w.get(&index));
+        let want = |i: u32| flags.is_none_or(|f| f[i as usize]);
         let Traced { texels, paths } = bake_glossy(shared, &mut probe, index as u32, &want, progress);
         traced.texels += texels;
         traced.paths += paths;

@@ -21,7 +21,7 @@ use reprobe::transport::World;
 use serde_json::json;
 
 /// Probes kept in memory by default: the eight of one camera, and those of the cells around it.
-const PROBE_CACHE: usize = 64;
+const PROBE_CACHE: usize = 32;
 
 pub fn params(args: &Args) -> anyhow::Result<GlossyProbeParams> {
     let base = if args.paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() };
