@@ -9,10 +9,12 @@
 //! - [`probe`]: placement, resolution map, quasi-harmonic map, bake, and the probe file (§4).
 //! - [`lightmap`]: the diffuse half, L(S|D)*DE.
 //! - [`render`]: G-buffer, mirror rays, perturbation, gather, footprint, filter, composite (§5, §6).
+//! - [`gpu`]: adapters, and kernels that are twins of CPU functions.
 //! - [`metric`]: RMSE, SSIM, FLIP and the report.
 //! - [`io`]: EXR layers, atomic writes, provenance.
 
 pub mod error;
+pub mod gpu;
 pub mod io;
 pub mod lightmap;
 pub mod math;

@@ -2,7 +2,7 @@
 
 use crate::math::direction_from_lat_long;
 use crate::transport::bsdf::Lobes;
-use crate::transport::{Ray, World};
+use crate::transport::{Hit, Ray, World};
 use glam::{Vec2, Vec3};
 
 /// The surface that one texel sees.
@@ -30,26 +30,41 @@ pub struct SeenBuffers {
 impl SeenBuffers {
     /// Fills the buffers, given what is seen along each unit direction.
     pub fn from_fn(size: [u32; 2], see: impl Fn(Vec3) -> Option<Seen>) -> Self {
-        let [w, h] = size;
-        let centre = |x: u32, y: u32| (Vec2::new(x as f32, y as f32) + 0.5) / Vec2::new(w as f32, h as f32);
-        let texels =
-            (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| see(direction_from_lat_long(centre(x, y)))).collect();
+        Self { size, texels: centres(size).map(|centre| see(direction_from_lat_long(centre))).collect() }
+    }
+
+    /// The rays from `position` through the texels' centres.
+    pub fn rays(position: Vec3, size: [u32; 2]) -> Vec<Ray> {
+        centres(size).map(|centre| Ray::new(position, direction_from_lat_long(centre))).collect()
+    }
+
+    /// Fills the buffers, given what each of [`SeenBuffers::rays`] meets first.
+    pub fn from_hits(world: &World, size: [u32; 2], rays: &[Ray], hits: &[Option<Hit>]) -> Self {
+        let texels = rays.iter().zip(hits).map(|(ray, hit)| hit.map(|hit| see(world, ray, &hit))).collect();
         Self { size, texels }
     }
 
     /// Casts the rays from `position`.
     pub fn cast(world: &World, position: Vec3, size: [u32; 2]) -> Self {
-        Self::from_fn(size, |d| see(world, &Ray::new(position, d)))
+        let rays = Self::rays(position, size);
+        let hits: Vec<_> = rays.iter().map(|ray| world.closest(ray)).collect();
+        Self::from_hits(world, size, &rays, &hits)
     }
 }
 
-fn see(world: &World, ray: &Ray) -> Option<Seen> {
-    let s = world.intersect(ray)?;
+/// Lat-long coordinates of the texels' centres, rows from the top.
+fn centres([w, h]: [u32; 2]) -> impl Iterator<Item = Vec2> {
+    let centre = move |x: u32, y: u32| (Vec2::new(x as f32, y as f32) + 0.5) / Vec2::new(w as f32, h as f32);
+    (0..h).flat_map(move |y| (0..w).map(move |x| centre(x, y)))
+}
+
+fn see(world: &World, ray: &Ray, hit: &Hit) -> Seen {
+    let s = world.surface(hit);
     let ng = if s.ng.dot(ray.d) > 0.0 { -s.ng } else { s.ng };
     let normal = if s.frame.n.dot(ng) < 0.0 { -s.frame.n } else { s.frame.n };
     let bsdf = &world.scene.materials[s.material as usize].bsdf;
     // One-sided models are black from behind.
     let lit = bsdf.is_two_sided() || s.frame.n.dot(ray.d) < 0.0;
     let alpha = if lit && bsdf.lobes().contains(Lobes::NON_DIFFUSE) { bsdf.alpha(&s) } else { None };
-    Some(Seen { alpha, depth: s.t, normal, facing: ng.dot(-ray.d).clamp(0.0, 1.0) })
+    Seen { alpha, depth: s.t, normal, facing: ng.dot(-ray.d).clamp(0.0, 1.0) }
 }

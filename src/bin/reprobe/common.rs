@@ -2,6 +2,7 @@
 
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use reprobe::gpu::{Choice, Gpu};
 use reprobe::progress::Progress;
 use reprobe::scene::load::LoadOptions;
 use reprobe::scene::{Scene, load};
@@ -20,7 +21,7 @@ pub struct Common {
     pub seed: u32,
     /// Where to compute: auto, cpu, gpu or gpu:NAME
     #[arg(long, global = true, value_name = "DEVICE", default_value = "auto")]
-    pub device: String,
+    pub device: Choice,
     /// No progress bar and no summary
     #[arg(long, short, global = true)]
     pub quiet: bool,
@@ -79,7 +80,7 @@ pub struct Outcome {
 }
 
 impl Common {
-    /// Sets up the thread pool and checks the device.
+    /// Sets up the thread pool.
     pub fn start(&self) -> anyhow::Result<()> {
         if let Some(n) = self.threads {
             if n == 0 {
@@ -87,11 +88,22 @@ impl Common {
             }
             rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")?;
         }
-        match self.device.as_str() {
-            "auto" | "cpu" => Ok(()),
-            d if d == "gpu" || d.starts_with("gpu:") => bail!("--device {d}: this build has no GPU backend; use --device cpu"),
-            d => bail!("--device {d}: expected auto, cpu, gpu or gpu:NAME"),
+        Ok(())
+    }
+
+    /// An error where a GPU is asked for by a command that has no use for one.
+    pub fn refuse_gpu(&self) -> anyhow::Result<()> {
+        match self.device {
+            Choice::Auto | Choice::Cpu => Ok(()),
+            Choice::Gpu | Choice::Named(_) => {
+                bail!("--device: of the commands, resmap runs on a GPU; use --device cpu for this one")
+            }
         }
+    }
+
+    /// The device to compute on; `None` for the CPU.
+    pub fn gpu(&self) -> anyhow::Result<Option<Arc<Gpu>>> {
+        Ok(Gpu::open(&self.device)?.map(Arc::new))
     }
 
     /// Loads a scene and prints its warnings.

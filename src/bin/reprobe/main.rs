@@ -5,6 +5,7 @@ mod bake_probes;
 mod common;
 mod compare;
 mod curvature;
+mod devices;
 mod info;
 mod place_probes;
 mod probe_set;
@@ -41,6 +42,7 @@ enum Command {
     BakeLightmap(bake_lightmap::Args),
     RenderPath(render_path::Args),
     Compare(compare::Args),
+    Devices(devices::Args),
     Info(info::Args),
     Run(run::Args),
 }
@@ -62,6 +64,9 @@ fn main() -> ExitCode {
 }
 
 fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
+    if !matches!(command, Command::Resmap(_) | Command::Devices(_)) {
+        common.refuse_gpu()?;
+    }
     match command {
         Command::PlaceProbes(args) => place_probes::run(args, common),
         Command::Resmap(args) => resmap::run(args, common),
@@ -71,6 +76,7 @@ fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
         Command::BakeLightmap(args) => bake_lightmap::run(args, common),
         Command::RenderPath(args) => render_path::run(args, common),
         Command::Compare(args) => compare::run(args, common),
+        Command::Devices(args) => devices::run(args, common),
         Command::Info(args) => info::run(args, common),
         Command::Run(args) => run::run(args, common),
     }

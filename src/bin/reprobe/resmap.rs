@@ -2,6 +2,7 @@
 
 use crate::common::{Common, Outcome, parse_size};
 use crate::probe_set;
+use reprobe::gpu::RayTracer;
 use reprobe::io::Provenance;
 use reprobe::io::provenance::hash_file;
 use reprobe::probe::placement::ProbeGrid;
@@ -68,6 +69,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let world = common.opaque_world(&args.scene)?;
     grid.provenance.check_scene(&args.probes, &world.scene.hash)?;
     let start = Instant::now();
+    let tracer = common.gpu()?.map(|gpu| RayTracer::new(gpu, &world)).transpose()?;
     let provenance =
         Provenance::new("resmap", &world.scene.hash, common.seed, &params).with_input("probes", hash_file(&args.probes)?);
     let set = ProbeSet { count: grid.len(), size: params.size, provenance };
@@ -78,7 +80,13 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         common,
         || Ok(()),
         |(), i| {
-            let seen = SeenBuffers::cast(&world, grid.position(i), params.size);
+            let seen = match &tracer {
+                None => SeenBuffers::cast(&world, grid.position(i), params.size),
+                Some(tracer) => {
+                    let rays = SeenBuffers::rays(grid.position(i), params.size);
+                    SeenBuffers::from_hits(&world, params.size, &rays, &tracer.closest(&world, &rays)?)
+                }
+            };
             let map = resolution_map(&params, &seen);
             texels.fetch_add(map.m_mat.len() as u64, Ordering::Relaxed);
             glossy.fetch_add(map.m_mat.iter().filter(|m| **m > 0.0).count() as u64, Ordering::Relaxed);
@@ -86,6 +94,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         },
     )?;
     let seconds = start.elapsed().as_secs_f64();
+    let device = tracer.as_ref().map_or("cpu", |t| t.device());
     // None where all maps were kept from before.
     let (texels, glossy) = (texels.into_inner(), glossy.into_inner());
     let share = (texels > 0).then(|| glossy as f64 / texels as f64);
@@ -93,11 +102,11 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let seen = share.map_or_else(String::new, |s| format!(", {:.0} % of their texels glossy", s * 100.0));
     Ok(Outcome {
         summary: format!(
-            "{}: {} maps of {w} x {h}, {kept} kept from before{seen}, {seconds:.1} s",
+            "{}: {} maps of {w} x {h}, {kept} kept from before{seen}, {seconds:.1} s on {device}",
             args.output.display(),
             set.count
         ),
-        figures: json!({"count": set.count, "kept": kept, "size": params.size, "glossy_share": share, "seconds": seconds}),
+        figures: json!({"count": set.count, "kept": kept, "size": params.size, "glossy_share": share, "device": device, "seconds": seconds}),
         ..Outcome::default()
     })
 }

@@ -23,6 +23,7 @@ use crate::scene::{Geometry, Scene};
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
+use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 #[cfg(target_arch = "x86_64")]
 use simd::{Avx2, Avx512};
@@ -35,6 +36,9 @@ use wide::Tree;
 /// hit, so that the tree finds whatever testing every triangle would.
 const BOX_MARGIN: f32 = 16.0 * f32::EPSILON;
 
+/// Most triangles a leaf of the compressed tree: what its nodes can say.
+const MAX_COMPRESSED_LEAF: u32 = 3;
+
 /// Hits of one object in one interval of this length along a ray share their hash, times (1 + largest coordinate of its origin).
 /// Sixteen times Mitsuba's step off a surface, so that few sheets thinner than that step straddle two intervals.
 const SHEET: f32 = 16.0 * 1500.0 * 0.5 * f32::EPSILON;
@@ -42,6 +46,9 @@ const SHEET: f32 = 16.0 * 1500.0 * 0.5 * f32::EPSILON;
 /// Acceleration structure over the triangles of a scene (all, or the opaque ones only).
 pub struct Bvh {
     tree: Tree,
+    /// The triangles that it is built over.
+    kept: Vec<u32>,
+    margin: f32,
     #[cfg(target_arch = "x86_64")]
     lanes: Lanes,
 }
@@ -56,8 +63,11 @@ impl Bvh {
         let has_opacity: Vec<bool> = scene.materials.iter().map(|m| m.opacity.is_some()).collect();
         let masked = |t| has_opacity.get(geometry.object(t).material as usize).copied().unwrap_or(false);
         let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
+        let margin = extent * BOX_MARGIN;
         Self {
-            tree: Tree::new(&binary_tree(geometry, &kept, extent * BOX_MARGIN), &kept, geometry, &masked),
+            tree: Tree::new(&binary_tree(geometry, &kept, margin), &kept, geometry, &masked),
+            kept,
+            margin,
             #[cfg(target_arch = "x86_64")]
             lanes: Lanes::detect(),
         }
@@ -87,6 +97,21 @@ impl Bvh {
             Lanes::Portable => {}
         }
         any_with(Portable, &self.tree, ray, passes)
+    }
+}
+
+impl Bvh {
+    /// The same triangles in the compressed tree that GPUs read, and their indices in the order of its leaves. `geometry` is what
+    /// the tree was built from.
+    pub fn compressed(&self, geometry: &Geometry) -> (CwBvh, Vec<u32>) {
+        let tree = bvh2_to_cwbvh(&binary_tree(geometry, &self.kept, self.margin), MAX_COMPRESSED_LEAF, true, false);
+        let triangles = tree.primitive_indices.iter().map(|&i| self.kept[i as usize]).collect();
+        (tree, triangles)
+    }
+
+    /// Whether `ray` goes on through a hit, for the surface's opacity.
+    pub fn passes(&self, scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
+        passes(scene, ray, hit)
     }
 }
 

@@ -1,0 +1,36 @@
+//! `reprobe devices`.
+
+use crate::common::{Common, Outcome};
+use reprobe::gpu::{Adapter, adapters};
+use serde_json::json;
+
+/// List the devices that this machine has
+///
+/// The CPU, and the adapters that Vulkan, Metal or DX12 offer. A command takes the one that its --device names; auto takes the first real GPU
+/// where the command can use one. Software adapters (llvmpipe) are taken only by name.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  reprobe devices
+  reprobe resmap room/scene.xml --probes probes.json -o resmap/ --device gpu:llvmpipe")]
+pub struct Args {}
+
+pub fn run(_: &Args, _: &Common) -> anyhow::Result<Outcome> {
+    let list = adapters();
+    let threads = rayon::current_num_threads();
+    let mut lines = vec![format!("cpu: {threads} threads; every command")];
+    lines.extend(list.iter().map(line));
+    if list.is_empty() {
+        lines.push("No GPU: neither Vulkan, Metal nor DX12 offers an adapter.".into());
+    }
+    Ok(Outcome {
+        summary: lines.join("\n"),
+        figures: json!({ "cpu": { "threads": threads }, "adapters": list }),
+        ..Outcome::default()
+    })
+}
+
+fn line(a: &Adapter) -> String {
+    let kind = if a.is_gpu { "gpu" } else { "software adapter, by name only" };
+    let clock = if a.timestamps { "timestamps" } else { "no timestamps" };
+    format!("gpu:\"{}\": {kind}; {}, {}; buffers of {} MiB, {clock}; resmap", a.name, a.backend, a.driver, a.max_binding >> 20)
+}

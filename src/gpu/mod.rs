@@ -1,0 +1,10 @@
+//! The GPU, by wgpu: adapters, and compute kernels that are twins of CPU functions.
+//!
+//! A kernel's WGSL lies in `shaders/` under its twin's name and shares its structs with a `#[repr(C)]` type here. Results are the CPU's
+//! but for rounding. Kernels run in dispatches of a second at the most, so that no driver takes the device for hung.
+
+mod device;
+mod rays;
+
+pub use device::{Adapter, Choice, Gpu, adapters};
+pub use rays::RayTracer;
