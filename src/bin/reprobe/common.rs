@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use reprobe::gpu::{Choice, Gpu};
+use reprobe::gpu::{Choice, Gpu, RayTracer};
 use reprobe::progress::Progress;
 use reprobe::scene::load::LoadOptions;
 use reprobe::scene::{Scene, load};
@@ -101,9 +101,17 @@ impl Common {
         }
     }
 
-    /// The device to compute on; `None` for the CPU.
-    pub fn gpu(&self) -> anyhow::Result<Option<Arc<Gpu>>> {
-        Ok(Gpu::open(&self.device)?.map(Arc::new))
+    /// The scene on the GPU that `--device` asks for; `None` for the CPU. Where the choice is ours, a GPU that cannot hold the scene is
+    /// passed over.
+    pub fn ray_tracer(&self, world: &World) -> anyhow::Result<Option<RayTracer>> {
+        let Some(gpu) = Gpu::open(&self.device)? else { return Ok(None) };
+        match RayTracer::new(Arc::new(gpu), world) {
+            Err(e) if self.device == Choice::Auto => {
+                eprintln!("reprobe: warning: on the CPU, since: {e}");
+                Ok(None)
+            }
+            tracer => Ok(Some(tracer?)),
+        }
     }
 
     /// Loads a scene and prints its warnings.
