@@ -181,17 +181,21 @@ impl Gpu {
         let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
     }
 
+    /// An error where a kernel could not bind a buffer of `size` bytes.
+    pub(super) fn fits(&self, label: &str, size: u64) -> Result<()> {
+        let (limit, name) = (self.adapter.max_binding, &self.adapter.name);
+        if size <= limit {
+            return Ok(());
+        }
+        let (size, limit) = (size >> 20, limit >> 20);
+        Err(Error::Request(format!(
+            "{label}: {size} MiB, but a kernel on GPU \"{name}\" takes {limit} MiB at the most; use --device cpu"
+        )))
+    }
+
     /// A buffer with `content`.
     pub(super) fn upload(&self, label: &str, content: &[u8]) -> Result<wgpu::Buffer> {
-        let limit = self.adapter.max_binding;
-        if content.len() as u64 > limit {
-            let name = &self.adapter.name;
-            return Err(Error::Request(format!(
-                "{label}: {} MiB, but a kernel on GPU \"{name}\" reads {} MiB at the most; use --device cpu",
-                content.len() >> 20,
-                limit >> 20
-            )));
-        }
+        self.fits(label, content.len() as u64)?;
         self.checked(|| {
             use wgpu::util::DeviceExt;
             // A binding may not be empty.

@@ -4,7 +4,10 @@
 //! but for rounding. Kernels run in dispatches of a second at the most, so that no driver takes the device for hung.
 
 mod device;
+mod filter;
+mod kernel;
 mod rays;
 
 pub use device::{Adapter, Choice, Gpu, adapters};
+pub use filter::Filter;
 pub use rays::RayTracer;

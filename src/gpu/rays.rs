@@ -3,6 +3,7 @@
 //! Alpha masks stay on the CPU: a hit that the ray passes through is sent again, to go on from there.
 
 use super::Gpu;
+use super::kernel::Kernel;
 use crate::transport::{Hit, Ray, World};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -51,7 +52,7 @@ impl GpuRay {
 /// A scene's triangles on a device, ready for rays.
 pub struct RayTracer {
     gpu: Arc<Gpu>,
-    pipeline: wgpu::ComputePipeline,
+    kernel: Kernel,
     nodes: wgpu::Buffer,
     corners: wgpu::Buffer,
 }
@@ -76,21 +77,8 @@ impl RayTracer {
         let nodes = gpu.upload("the scene's tree", bytemuck::cast_slice(&tree.nodes))?;
         let corners = gpu.upload("the scene's triangles", bytemuck::cast_slice(&corners))?;
         let source = concat!(include_str!("../../shaders/traverse.wgsl"), include_str!("../../shaders/closest.wgsl"));
-        let pipeline = gpu.checked(|| {
-            let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("closest"),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            });
-            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some("closest"),
-                layout: None,
-                module: &module,
-                entry_point: Some("closest"),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        })?;
-        Ok(Self { gpu, pipeline, nodes, corners })
+        let kernel = Kernel::new(&gpu, source, "closest")?;
+        Ok(Self { gpu, kernel, nodes, corners })
     }
 
     /// The device's name.
@@ -125,41 +113,11 @@ impl RayTracer {
     }
 
     fn batch(&self, rays: &[GpuRay]) -> Result<Vec<GpuHit>> {
-        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        let rays_buffer = self.gpu.upload("rays", bytemuck::cast_slice(rays))?;
-        let size = std::mem::size_of_val(rays) as u64 / size_of::<GpuRay>() as u64 * size_of::<GpuHit>() as u64;
-        let bytes = self.gpu.checked(|| {
-            let buffer = |usage| {
-                device.create_buffer(&wgpu::BufferDescriptor { label: Some("hits"), size, usage, mapped_at_creation: false })
-            };
-            let hits = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-            let back = buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-            let entries = [&self.nodes, &self.corners, &rays_buffer, &hits];
-            let entries: Vec<_> = entries
-                .into_iter()
-                .enumerate()
-                .map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() })
-                .collect();
-            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("closest"),
-                layout: &self.pipeline.get_bind_group_layout(0),
-                entries: &entries,
-            });
-            let mut encoder = device.create_command_encoder(&Default::default());
-            {
-                let mut pass = encoder.begin_compute_pass(&Default::default());
-                pass.set_pipeline(&self.pipeline);
-                pass.set_bind_group(0, &group, &[]);
-                pass.dispatch_workgroups(rays.len().div_ceil(WORKGROUP) as u32, 1, 1);
-            }
-            encoder.copy_buffer_to_buffer(&hits, 0, &back, 0, size);
-            queue.submit([encoder.finish()]);
-            back.map_async(wgpu::MapMode::Read, .., |_| ());
-            self.gpu.wait();
-            back.get_mapped_range(..).map(|view| view.to_vec())
-        })?;
-        let bytes = bytes.map_err(|e| Error::Request(format!("GPU \"{}\": {e}", self.gpu.adapter.name)))?;
-        Ok(bytemuck::pod_collect_to_vec(&bytes))
+        let sent = self.gpu.upload("rays", bytemuck::cast_slice(rays))?;
+        let hits = self.gpu.output("hits", (rays.len() * size_of::<GpuHit>()) as u64)?;
+        let groups = [rays.len().div_ceil(WORKGROUP) as u32, 1];
+        self.gpu.dispatch(&self.kernel, &[&self.nodes, &self.corners, &sent, &hits], groups)?;
+        self.gpu.read(&hits)
     }
 }
 

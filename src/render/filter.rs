@@ -12,11 +12,12 @@
 //! In: linear radiance and its guides a pixel, covariance in pixels². Out: linear radiance. Pixels without a glossy surface neither
 //! give nor take.
 
-mod four_pass;
+pub(crate) mod four_pass;
 
 use crate::math::Rgb;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::convert::Infallible;
 
 /// [`FilterInput::material`] of a pixel without a glossy surface.
 pub const NOT_GLOSSY: u32 = u32::MAX;
@@ -134,11 +135,10 @@ pub fn filter(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
     match params.method {
         Method::Full => full(input, params),
         Method::FourPass | Method::TwoPass => {
-            let gaussians: &[(f32, f32)] = match params.kernel {
-                Kernel::Gaussian => &[(1.0, 1.0)],
-                Kernel::Ggx => &GGX_GAUSSIANS,
-            };
-            four_pass::filter(input, params, gaussians)
+            let Ok(out) = four_pass::filter_by::<Infallible>(input, params, &|axes, taps, passes| {
+                Ok(four_pass::chain(input.width, params, axes, taps, passes))
+            });
+            out
         }
     }
 }

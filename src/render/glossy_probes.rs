@@ -8,6 +8,7 @@ use super::gather::{GatherParams, Gathered, gather};
 use super::gbuffer::{GBuffer, Pixel, gbuffer};
 use super::mirror::{Reflected, mirror_pass};
 use crate::Result;
+use crate::gpu;
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::probe::placement::{ProbeGrid, ProbeWeight};
@@ -96,6 +97,8 @@ pub struct Renderer<'a> {
     pub lightmap: Option<&'a LightMap>,
     /// Parameters.
     pub params: GlossyProbeParams,
+    /// Where the filter runs; `None` for the CPU.
+    pub gpu_filter: Option<gpu::Filter>,
     footprint: Option<Footprint>,
     candidates: NearCandidates,
     previous: Option<Previous>,
@@ -111,7 +114,16 @@ impl<'a> Renderer<'a> {
         roughness_scale: f32,
     ) -> Self {
         let footprint = params.footprint.map(|f| Footprint::new(&FootprintParams { roughness_scale, ..f }));
-        Self { world, curvature, lightmap, params, footprint, candidates: NearCandidates::default(), previous: None }
+        Self {
+            world,
+            curvature,
+            lightmap,
+            params,
+            gpu_filter: None,
+            footprint,
+            candidates: NearCandidates::default(),
+            previous: None,
+        }
     }
 
     /// Renders the next frame of a path.
@@ -142,7 +154,7 @@ impl<'a> Renderer<'a> {
             None => vec![[0.0; 3]; gathered.len()],
         };
         clock.lap("footprint");
-        let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter);
+        let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter, self.gpu_filter.as_ref())?;
         clock.lap("filter");
         let diffuse = match self.lightmap {
             Some(map) => diffuse_layer(&self.world.scene, &view, map),
@@ -193,24 +205,31 @@ fn footprint_pass(footprint: &Footprint, view: &GBuffer, reflected: &[Reflected]
     pixels.map(|p| of(p).unwrap_or([0.0; 3])).collect()
 }
 
-fn filter_pass(view: &GBuffer, gathered: &[Gathered], covariance: &[[f32; 3]], params: &FilterParams) -> Vec<Rgb> {
+fn filter_pass(
+    view: &GBuffer,
+    gathered: &[Gathered],
+    covariance: &[[f32; 3]],
+    params: &FilterParams,
+    gpu: Option<&gpu::Filter>,
+) -> Result<Vec<Rgb>> {
     let [width, height] = view.size();
     let glossy = |f: &(dyn Fn(&Pixel) -> u32 + Sync)| -> Vec<u32> {
         view.pixels.par_iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(u32::MAX, f)).collect()
     };
-    filter(
-        &FilterInput {
-            width,
-            height,
-            color: &gathered.par_iter().map(|g| g.color).collect::<Vec<_>>(),
-            normal: &view.pixels.par_iter().map(|p| p.as_ref().map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
-            depth: &view.pixels.par_iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
-            material: &glossy(&|p| p.surface.material),
-            covariance,
-            energy: &gathered.par_iter().map(|g| g.energy).collect::<Vec<_>>(),
-        },
-        params,
-    )
+    let input = FilterInput {
+        width,
+        height,
+        color: &gathered.par_iter().map(|g| g.color).collect::<Vec<_>>(),
+        normal: &view.pixels.par_iter().map(|p| p.as_ref().map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
+        depth: &view.pixels.par_iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
+        material: &glossy(&|p| p.surface.material),
+        covariance,
+        energy: &gathered.par_iter().map(|g| g.energy).collect::<Vec<_>>(),
+    };
+    match gpu {
+        Some(gpu) => gpu.filter(&input, params),
+        None => Ok(filter(&input, params)),
+    }
 }
 
 struct Clock {

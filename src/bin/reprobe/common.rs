@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use reprobe::gpu::{Choice, Gpu, RayTracer};
+use reprobe::gpu::{Choice, Gpu};
 use reprobe::progress::Progress;
 use reprobe::scene::load::LoadOptions;
 use reprobe::scene::{Scene, load};
@@ -96,21 +96,21 @@ impl Common {
         match self.device {
             Choice::Auto | Choice::Cpu => Ok(()),
             Choice::Gpu | Choice::Named(_) => {
-                bail!("--device: of the commands, resmap runs on a GPU; use --device cpu for this one")
+                bail!("--device: resmap and the filter of render-path run on a GPU as yet; use --device cpu here")
             }
         }
     }
 
-    /// The scene on the GPU that `--device` asks for; `None` for the CPU. Where the choice is ours, a GPU that cannot hold the scene is
+    /// What `make` makes of the GPU that `--device` asks for; `None` for the CPU. Where the choice is ours, a GPU on which that fails is
     /// passed over.
-    pub fn ray_tracer(&self, world: &World) -> anyhow::Result<Option<RayTracer>> {
-        let Some(gpu) = Gpu::open(&self.device)? else { return Ok(None) };
-        match RayTracer::new(Arc::new(gpu), world) {
+    pub fn on_gpu<T>(&self, make: impl FnOnce(Arc<Gpu>) -> reprobe::Result<T>) -> anyhow::Result<Option<T>> {
+        let made = Gpu::open(&self.device).and_then(|gpu| gpu.map(|gpu| make(Arc::new(gpu))).transpose());
+        match made {
             Err(e) if self.device == Choice::Auto => {
                 eprintln!("reprobe: warning: on the CPU, since: {e}");
                 Ok(None)
             }
-            tracer => Ok(Some(tracer?)),
+            made => Ok(made?),
         }
     }
 

@@ -64,7 +64,7 @@ fn main() -> ExitCode {
 }
 
 fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
-    if !matches!(command, Command::Resmap(_) | Command::Devices(_)) {
+    if !matches!(command, Command::Resmap(_) | Command::RenderPath(_) | Command::Devices(_)) {
         common.refuse_gpu()?;
     }
     match command {

@@ -6,6 +6,7 @@ use crate::render_path::{Args, describe, finish, is_finished, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
 use anyhow::{Context, bail};
+use reprobe::gpu::Filter;
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
@@ -70,8 +71,13 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     // A frame may borrow pixels from the one before it, so the path is rendered as a whole.
     let kept = frames.iter().all(|(path, provenance)| is_finished(path, provenance));
 
-    let supersample = params.supersample;
+    let (supersample, filter) = (params.supersample, params.filter);
     let mut renderer = Renderer::new(&world, &curvature, lightmap.as_ref(), params, probes.set.roughness_scale);
+    if !kept {
+        let pixels = cameras.iter().map(|c| c.size.iter().map(|&s| (s * supersample) as usize).product()).max().unwrap_or(0);
+        renderer.gpu_filter = common.on_gpu(|gpu| Filter::new(gpu, &filter, pixels))?;
+        timings.gpu_filter = renderer.gpu_filter.as_ref().map(|f| f.device().to_owned());
+    }
     let bar = common.progress();
     bar.start("glossy-probes", frames.len() as u64);
     for (camera, (path, provenance)) in cameras.iter().zip(frames) {

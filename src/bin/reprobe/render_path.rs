@@ -100,7 +100,10 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     };
     match args.method {
         Method::GlossyProbes => render_glossy::run(args, common, timings),
-        Method::PathTrace => run_path_trace(args, common, timings),
+        Method::PathTrace => {
+            common.refuse_gpu()?;
+            run_path_trace(args, common, timings)
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::common::{Common, Outcome, parse_size};
 use crate::probe_set;
+use reprobe::gpu::RayTracer;
 use reprobe::io::Provenance;
 use reprobe::io::provenance::hash_file;
 use reprobe::probe::placement::ProbeGrid;
@@ -68,7 +69,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let world = common.opaque_world(&args.scene)?;
     grid.provenance.check_scene(&args.probes, &world.scene.hash)?;
     let start = Instant::now();
-    let tracer = common.ray_tracer(&world)?;
+    let tracer = common.on_gpu(|gpu| RayTracer::new(gpu, &world))?;
     let provenance =
         Provenance::new("resmap", &world.scene.hash, common.seed, &params).with_input("probes", hash_file(&args.probes)?);
     let set = ProbeSet { count: grid.len(), size: params.size, provenance };
