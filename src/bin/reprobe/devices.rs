@@ -32,5 +32,11 @@ pub fn run(_: &Args, _: &Common) -> anyhow::Result<Outcome> {
 fn line(a: &Adapter) -> String {
     let kind = if a.is_gpu { "gpu" } else { "software adapter, by name only" };
     let clock = if a.timestamps { "timestamps" } else { "no timestamps" };
-    format!("gpu:\"{}\": {kind}; {}, {}; buffers of {} MiB, {clock}; resmap, render-path (its filter)", a.name, a.backend, a.driver, a.max_binding >> 20)
+    format!(
+        "gpu:\"{}\": {kind}; {}, {}; buffers of {} MiB, {clock}; resmap, render-path (its filter)",
+        a.name,
+        a.backend,
+        a.driver,
+        a.max_binding >> 20
+    )
 }
