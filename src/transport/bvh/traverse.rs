@@ -1,4 +1,4 @@
-//! Walks through the eight-wide tree: nearest octant first for the closest hit, in any order for any hit.
+//! Walks through the eight-wide tree: nearest octant first for the closest hit, farthest first for any hit.
 
 use super::simd::Simd;
 use super::triangle::Shear;
@@ -32,8 +32,9 @@ struct Prepared<S: Simd> {
 }
 
 impl<S: Simd> Prepared<S> {
+    /// `first`: the octant of directions for which children are visited nearest first.
     #[inline(always)]
-    fn new(s: S, ray: &Ray) -> Self {
+    fn new(s: S, ray: &Ray, first: u32) -> Self {
         let d = [ray.d.x, ray.d.y, ray.d.z];
         let negative = d.map(|x| x.is_sign_negative());
         let inverse = d.map(|x| 1.0 / if x.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(x) } else { x });
@@ -42,7 +43,7 @@ impl<S: Simd> Prepared<S> {
             inverse: splat3(s, inverse),
             start: splat3(s, [ray.o.x * inverse[0], ray.o.y * inverse[1], ray.o.z * inverse[2]]),
             near: [0, 1, 2].map(|k| if negative[k] { k + 3 } else { k }),
-            order: s.octant_order(u32::from(negative[0]) | u32::from(negative[1]) << 1 | u32::from(negative[2]) << 2),
+            order: s.octant_order(first),
             t_min: s.splat(ray.t_min),
             shear_origin: splat3(s, shear.origin),
             shear: splat3(s, shear.shear),
@@ -109,7 +110,7 @@ pub fn closest<S: Simd>(
     stack: (&mut [f32], &mut [u32]),
     passes: &mut dyn FnMut(&Hit) -> bool,
 ) -> Option<Hit> {
-    let r = Prepared::new(s, ray);
+    let r = Prepared::new(s, ray, octant(ray));
     let (entries, ids) = stack;
     // A triangle so thin that its distance overflows is no hit: hence not infinity.
     let mut nearest = ray.t_max.min(f32::MAX);
@@ -159,7 +160,8 @@ pub fn closest<S: Simd>(
 /// Whether there is any hit that `passes` does not wave through.
 #[inline(always)]
 pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
-    let r = Prepared::new(s, ray);
+    // What a ray starts from rarely blocks it; what stands before the light often does: a tenth faster than nearest first or no order.
+    let r = Prepared::new(s, ray, !octant(ray) & 7);
     let t_max = s.splat(ray.t_max.min(f32::MAX));
     let Some(root) = tree.root else { return false };
     ids[0] = root;
@@ -170,8 +172,8 @@ pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut 
         if id & MARK == 0 {
             let node = &tree.nodes[id as usize];
             let (enter, leave) = r.slabs(s, node, t_max);
-            let mask = s.le(enter, leave);
-            let children = s.pack_ids(s.load_ids(&node.children), mask);
+            let mask = s.le_permuted(enter, leave, r.order);
+            let children = s.pack_ids(s.permute_ids(s.load_ids(&node.children), r.order), mask);
             s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
             let end = top + mask.count_ones() as usize;
             prefetch(s, tree, &ids[top..end]);
@@ -207,6 +209,13 @@ fn prefetch<S: Simd>(s: S, tree: &Tree, ids: &[u32]) {
             s.prefetch(&tree.blocks[(id & !MARK) as usize]);
         }
     }
+}
+
+/// A bit for each axis along which the ray goes down.
+#[inline(always)]
+fn octant(ray: &Ray) -> u32 {
+    let [x, y, z] = [ray.d.x, ray.d.y, ray.d.z].map(|x| u32::from(x.is_sign_negative()));
+    x | y << 1 | z << 2
 }
 
 #[inline(always)]
