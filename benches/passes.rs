@@ -7,10 +7,10 @@ mod timing;
 
 use reprobe::probe::store::ProbeStore;
 use reprobe::render::candidates::NearCandidates;
-use reprobe::render::filter::{FilterInput, FilterParams, filter};
+use reprobe::render::filter::FilterParams;
 use reprobe::render::gather::{GatherParams, gather};
 use reprobe::render::gbuffer::gbuffer;
-use reprobe::render::glossy_probes::nearest_probes;
+use reprobe::render::glossy_probes::{filter_pass, nearest_probes};
 use reprobe::render::mirror::mirror_pass;
 use reprobe::scene::Camera;
 use reprobe::surface::curvature_file;
@@ -49,25 +49,9 @@ fn main() {
     let gathered = time("gather", RUNS, || gather_with(&params));
     time("gather, every pixel in full", RUNS, || gather_with(&GatherParams { anchors: 1, ..params.clone() }));
 
-    let glossy = |p: &reprobe::render::gbuffer::Pixel| p.alpha.map_or(u32::MAX, |_| p.surface.material);
-    let color: Vec<_> = gathered.iter().map(|g| g.color).collect();
-    let energy: Vec<_> = gathered.iter().map(|g| g.energy).collect();
-    let normal: Vec<_> = view.pixels.iter().map(|p| p.as_ref().map_or(glam::Vec3::ZERO, |p| p.normal)).collect();
-    let depth: Vec<_> = view.pixels.iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect();
-    let material: Vec<_> = view.pixels.iter().map(|p| p.as_ref().map_or(u32::MAX, glossy)).collect();
     for sigma in [1.0, 4.0, 16.0] {
-        let covariance = vec![[sigma * sigma, 0.0, sigma * sigma]; color.len()];
-        let [width, height] = size.map(|n| n as usize);
-        let input = FilterInput {
-            width,
-            height,
-            color: &color,
-            normal: &normal,
-            depth: &depth,
-            material: &material,
-            covariance: &covariance,
-            energy: &energy,
-        };
-        time(&format!("filter of {sigma} pixels"), RUNS, || filter(&input, &FilterParams::default()));
+        let covariance = vec![[sigma * sigma, 0.0, sigma * sigma]; gathered.len()];
+        let pass = || filter_pass(&view, &gathered, &covariance, &FilterParams::default(), None).expect("the CPU's cannot fail");
+        time(&format!("filter of {sigma} pixels"), RUNS, pass);
     }
 }

@@ -4,6 +4,7 @@
 
 use super::Gpu;
 use super::kernel::Kernel;
+use crate::transport::bvh::passes;
 use crate::transport::{Hit, Ray, World};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -100,7 +101,7 @@ impl RayTracer {
                     }
                     let GpuHit { t, triangle, u, v } = hit;
                     let hit = Hit { t, triangle, u, v };
-                    if world.bvh.passes(&world.scene, &rays[i], &hit) {
+                    if passes(&world.scene, &rays[i], &hit) {
                         again.push((i, GpuRay { t_min: t, after: triangle, ..ray }));
                     } else {
                         found[i] = Some(hit);

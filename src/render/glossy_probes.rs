@@ -2,7 +2,7 @@
 
 use super::candidates::NearCandidates;
 use super::composite::{Previous, diffuse_layer, downsample, reproject_previous};
-use super::filter::{FilterInput, FilterParams, filter};
+use super::filter::{FilterInput, FilterParams, NOT_GLOSSY, filter};
 use super::footprint::{Footprint, FootprintParams, GlossyPoint};
 use super::gather::{GatherParams, Gathered, gather};
 use super::gbuffer::{GBuffer, Pixel, gbuffer};
@@ -205,7 +205,8 @@ fn footprint_pass(footprint: &Footprint, view: &GBuffer, reflected: &[Reflected]
     pixels.map(|p| of(p).unwrap_or([0.0; 3])).collect()
 }
 
-fn filter_pass(
+/// The glossy filter (§6.2) over a view's gathered colours, on the CPU where no `gpu` is given.
+pub fn filter_pass(
     view: &GBuffer,
     gathered: &[Gathered],
     covariance: &[[f32; 3]],
@@ -213,16 +214,15 @@ fn filter_pass(
     gpu: Option<&gpu::Filter>,
 ) -> Result<Vec<Rgb>> {
     let [width, height] = view.size();
-    let glossy = |f: &(dyn Fn(&Pixel) -> u32 + Sync)| -> Vec<u32> {
-        view.pixels.par_iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(u32::MAX, f)).collect()
-    };
+    let pixels = || view.pixels.par_iter().map(Option::as_ref);
+    let material = |p: Option<&Pixel>| p.filter(|p| p.alpha.is_some()).map_or(NOT_GLOSSY, |p| p.surface.material);
     let input = FilterInput {
         width,
         height,
         color: &gathered.par_iter().map(|g| g.color).collect::<Vec<_>>(),
-        normal: &view.pixels.par_iter().map(|p| p.as_ref().map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
-        depth: &view.pixels.par_iter().map(|p| p.as_ref().map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
-        material: &glossy(&|p| p.surface.material),
+        normal: &pixels().map(|p| p.map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
+        depth: &pixels().map(|p| p.map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
+        material: &pixels().map(material).collect::<Vec<_>>(),
         covariance,
         energy: &gathered.par_iter().map(|g| g.energy).collect::<Vec<_>>(),
     };

@@ -98,20 +98,13 @@ impl Bvh {
         }
         any_with(Portable, &self.tree, ray, passes)
     }
-}
 
-impl Bvh {
     /// The same triangles in the compressed tree that GPUs read, and their indices in the order of its leaves. `geometry` is what
     /// the tree was built from.
     pub fn compressed(&self, geometry: &Geometry) -> (CwBvh, Vec<u32>) {
         let tree = bvh2_to_cwbvh(&binary_tree(geometry, &self.kept, self.margin), MAX_COMPRESSED_LEAF, true, false);
         let triangles = tree.primitive_indices.iter().map(|&i| self.kept[i as usize]).collect();
         (tree, triangles)
-    }
-
-    /// Whether `ray` goes on through a hit, for the surface's opacity.
-    pub fn passes(&self, scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
-        passes(scene, ray, hit)
     }
 }
 
@@ -197,7 +190,7 @@ fn any_avx512(s: Avx512, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) ->
 }
 
 /// Whether `ray` goes through a triangle of partly opaque material.
-fn passes(scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
+pub(crate) fn passes(scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
     let object_index = scene.geometry.triangle_object[hit.triangle as usize];
     let object = &scene.geometry.objects[object_index as usize];
     let Some(opacity) = &scene.materials[object.material as usize].opacity else { return false };
