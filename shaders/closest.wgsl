@@ -1,11 +1,11 @@
-// The closest hits of a list of rays. Follows traverse.wgsl.
+// The closest hits of a list of rays. Twin: transport::World::closest.
 
-@group(0) @binding(2) var<storage, read> rays: array<Ray>;
-@group(0) @binding(3) var<storage, read_write> hits: array<Hit>;
+@group(0) @binding(0) var<storage, read> rays: array<Ray>;
+@group(0) @binding(1) var<storage, read_write> hits: array<Hit>;
 
 @compute @workgroup_size(64)
 fn closest(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < arrayLength(&rays) {
-        hits[id.x] = closest_hit(rays[id.x]);
+        hits[id.x] = traverse(rays[id.x], false);
     }
 }

@@ -1,37 +1,18 @@
-// Closest hit in a compressed eight-wide BVH (Ylitie, Karras and Laine 2017) of 80-byte nodes, and the watertight triangle test
-// (Woop, Benthin and Wald 2013) in the same steps as on the CPU.
+// Closest and any hits in a compressed eight-wide BVH (Ylitie, Karras and Laine 2017) of 80-byte nodes, and the watertight triangle test
+// (Woop, Benthin and Wald 2013) in the same steps as on the CPU. Twin: src/transport/bvh/.
 //
 // A group is what is left to visit of one node: x is the index of its first child node or primitive; y has a bit a child that
 // was hit, nearest child highest: inner children in the upper 8 bits, with the mask of all inner children in the lower 8, or
 // primitives in the lower 24.
 
-struct Ray {
-    origin: vec3<f32>,
-    t_min: f32,
-    direction: vec3<f32>,
-    t_max: f32,
-    // Hits at t_min count for triangles above this one alone; NO_TRIANGLE: for all.
-    after: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
-}
-
-struct Hit {
-    t: f32,
-    triangle: u32,
-    u: f32,
-    v: f32,
-}
-
 const NO_TRIANGLE: u32 = 0xffffffffu;
-// Twin: gpu::rays::STACK.
+// Twin: gpu::scene::STACK.
 const STACK: u32 = 32u;
+// Twin: transport::bvh::SHEET.
+const SHEET: f32 = 16.0 * 1500.0 * EPSILON;
 
-// Five a node.
-@group(0) @binding(0) var<storage, read> nodes: array<vec4<u32>>;
-// Three a primitive, in the order of the tree's leaves; the first one's w holds the triangle's index as bits.
-@group(0) @binding(1) var<storage, read> corners: array<vec4<f32>>;
+// Whether any material lets rays through: scenes without masks do not pay for them.
+override HAS_MASKS: bool = true;
 
 struct Shear {
     axes: vec3<u32>,
@@ -62,10 +43,12 @@ fn sheared(s: Shear, corner: vec3<f32>) -> vec3<f32> {
 // The primitive's hit where it comes before `best`: nearer, or at the same distance and of lower index.
 fn nearer(s: Shear, ray: Ray, primitive: u32, best: Hit) -> Hit {
     let first = corners[3u * primitive];
-    let triangle = bitcast<u32>(first.w);
-    let a = sheared(s, first.xyz);
-    let b = sheared(s, corners[3u * primitive + 1u].xyz);
-    let c = sheared(s, corners[3u * primitive + 2u].xyz);
+    let second = corners[3u * primitive + 1u];
+    let third = corners[3u * primitive + 2u];
+    let triangle = first.w;
+    let a = sheared(s, bitcast<vec3<f32>>(first.xyz));
+    let b = sheared(s, bitcast<vec3<f32>>(second.xyz));
+    let c = sheared(s, bitcast<vec3<f32>>(third.xyz));
     let e = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
     let det = e.x + e.y + e.z;
     if !(all(e >= vec3(0.0)) || all(e <= vec3(0.0))) || det == 0.0 {
@@ -73,11 +56,28 @@ fn nearer(s: Shear, ray: Ray, primitive: u32, best: Hit) -> Hit {
     }
     let w = e * (1.0 / det);
     let t = (w.x * a.z + w.y * b.z + w.z * c.z) * s.shear.z;
-    let counts = t > ray.t_min || (t == ray.t_min && triangle >= ray.after + 1u);
-    if counts && (t < best.t || (t == best.t && triangle < best.triangle)) {
-        return Hit(t, triangle, w.y, w.z);
+    if t < ray.t_min || !(t < best.t || (t == best.t && triangle < best.triangle)) {
+        return best;
     }
-    return best;
+    let hit = Hit(t, triangle, w.y, w.z);
+    if HAS_MASKS {
+        if second.w != NONE && passes(ray, hit, materials[second.w].opacity, third.w) {
+            return best;
+        }
+    }
+    return hit;
+}
+
+// Whether `ray` goes through a triangle of partly opaque material. Twin: transport::bvh::passes.
+fn passes(ray: Ray, hit: Hit, opacity: u32, object: u32) -> bool {
+    let o = bitcast<vec3<u32>>(ray.origin);
+    let d = bitcast<vec3<u32>>(ray.direction);
+    var h = hash_next(hash_next(hash_next(hash_start(), o.x), o.y), o.z);
+    h = hash_next(hash_next(hash_next(h, d.x), d.y), d.z);
+    let of_ray = hash_end(h);
+    let interval = floor(hit.t / (SHEET * (1.0 + max3(abs(ray.origin)))) + unit(of_ray));
+    h = hash_next(hash_next(hash_next(hash_start(), of_ray), object), bitcast<u32>(interval));
+    return unit(hash_end(h)) >= texture_scalar(opacity, facet_uv(facet(hit.triangle), hit.u, hit.v));
 }
 
 fn byte(words: vec2<u32>, i: u32) -> u32 {
@@ -99,10 +99,10 @@ fn children_hit(node: u32, ray: Ray, inverse: vec3<f32>, octant: u32, t_max: f32
         let m = byte(metas, i);
         let low = vec3<f32>(vec3(byte(q0.xy, i), byte(q1.xy, i), byte(q2.xy, i))) * scale + offset;
         let high = vec3<f32>(vec3(byte(q0.zw, i), byte(q1.zw, i), byte(q2.zw, i))) * scale + offset;
-        let near = min(low, high);
-        let far = max(low, high);
-        let enter = max(max(near.x, near.y), max(near.z, ray.t_min));
-        let leave = min(min(far.x, far.y), min(far.z, t_max));
+        let lower = min(low, high);
+        let upper = max(low, high);
+        let enter = max(max(lower.x, lower.y), max(lower.z, ray.t_min));
+        let leave = min(min(upper.x, upper.y), min(upper.z, t_max));
         if enter <= leave {
             // Empty slots have no bits.
             let is_inner = (m & 0x18u) == 0x18u;
@@ -113,7 +113,8 @@ fn children_hit(node: u32, ray: Ray, inverse: vec3<f32>, octant: u32, t_max: f32
     return hits;
 }
 
-fn closest_hit(ray: Ray) -> Hit {
+// The closest hit; with `any`, the first that is found. Empty where t_max is below t_min.
+fn traverse(ray: Ray, any: bool) -> Hit {
     var best = Hit(ray.t_max, NO_TRIANGLE, 0.0, 0.0);
     let s = shear_of(ray);
     // Small enough to be no direction at all, large enough that its inverse times a scene stays a number.
@@ -146,6 +147,9 @@ fn closest_hit(ray: Ray) -> Hit {
             let bit = firstTrailingBit(primitives.y);
             primitives.y &= primitives.y - 1u;
             best = nearer(s, ray, primitives.x + bit, best);
+        }
+        if any && best.triangle != NO_TRIANGLE {
+            break;
         }
         if inner.y <= 0x00ffffffu {
             if height == 0u {

@@ -137,6 +137,7 @@ impl Gpu {
         let required_limits = wgpu::Limits {
             max_storage_buffer_binding_size: there.max_storage_buffer_binding_size.max(LEAST_BINDING),
             max_buffer_size: there.max_buffer_size,
+            max_storage_buffers_per_shader_stage: there.max_storage_buffers_per_shader_stage,
             ..wgpu::Limits::default()
         };
         let name = adapter.get_info().name;
@@ -198,8 +199,8 @@ impl Gpu {
         self.fits(label, content.len() as u64)?;
         self.checked(|| {
             use wgpu::util::DeviceExt;
-            // A binding may not be empty.
-            let contents = if content.is_empty() { &[0; 16] } else { content };
+            // A binding may not be smaller than one element.
+            let contents = if content.is_empty() { &[0; 512] } else { content };
             self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some(label),
                 contents,

@@ -3,11 +3,18 @@
 //! A kernel's WGSL lies in `shaders/` under its twin's name and shares its structs with a `#[repr(C)]` type here. Results are the CPU's
 //! but for rounding. Kernels run in dispatches of a second at the most, so that no driver takes the device for hung.
 
+mod camera;
 mod device;
 mod filter;
+mod follow;
 mod kernel;
+mod pace;
+mod path_trace;
 mod rays;
+mod scene;
 
 pub use device::{Adapter, Choice, Gpu, adapters};
 pub use filter::Filter;
+pub use path_trace::PathTracer;
 pub use rays::RayTracer;
+pub use scene::GpuScene;

@@ -34,7 +34,7 @@ pub struct LightMap {
     /// E_T behind, where any surface has a lit back.
     pub back: Option<Vec<Rgb>>,
     /// Each triangle's corners in texels; NaN for triangles without light.
-    corners: Vec<[Vec2; 3]>,
+    pub(crate) corners: Vec<[Vec2; 3]>,
 }
 
 impl LightMap {

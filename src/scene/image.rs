@@ -19,11 +19,11 @@ pub struct Image {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    pixels: Pixels,
+    pub(crate) pixels: Pixels,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Pixels {
+pub(crate) enum Pixels {
     Float(Vec<Rgb>),
     /// Three bytes a pixel, a quarter of the floats' memory and cache misses, and the linear value of each byte.
     Bytes {

@@ -14,18 +14,18 @@ use std::sync::Arc;
 /// An environment image that can be sampled.
 #[derive(Debug)]
 pub struct Envmap {
-    image: Arc<Image>,
-    scale: f32,
-    world_from_local: Mat3,
-    local_from_world: Mat3,
+    pub(crate) image: Arc<Image>,
+    pub(crate) scale: f32,
+    pub(crate) world_from_local: Mat3,
+    pub(crate) local_from_world: Mat3,
     /// Distribution over rows of cells.
-    rows: Steps,
+    pub(crate) rows: Steps,
     /// Distribution along each row of cells.
-    columns: Vec<Steps>,
+    pub(crate) columns: Vec<Steps>,
     /// Sine of the polar angle of each row of pixels. (An image of one or two rows is nothing but poles: 1 there.)
-    sines: Vec<f32>,
+    pub(crate) sines: Vec<f32>,
     /// Mean corner value over all cells: what turns a corner value into a density.
-    mean: f32,
+    pub(crate) mean: f32,
 }
 
 /// A cell of the pixel grid and where in it.

@@ -4,6 +4,7 @@
 //! direction and of power, put together by the surface area orientation heuristic. Ours: no splitting, one emitter a
 //! descent; and a surface's back counts as [`BACK`], not as nothing, so that no scattering model is ever cut off.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -45,18 +46,22 @@ pub struct LightBounds {
 /// Children of a node: an emitter that many others surround costs two or three steps, and eight bounds side by side vectorise.
 const WIDTH: usize = 8;
 
+/// Marks a child that is an emitter.
+const LEAF: u32 = 1 << 31;
+
 /// The hierarchy; emitters are numbers from 0 in the order in which their bounds came.
 #[derive(Debug, Default)]
 pub struct LightTree {
     /// The root first.
-    nodes: Vec<Node>,
+    pub(crate) nodes: Vec<Node>,
     /// Node and slot of each emitter.
-    place: Vec<(u32, u32)>,
+    pub(crate) place: Vec<[u32; 2]>,
 }
 
-/// Bounds of the children, a slot each, with their trigonometry done. Empty slots have no power.
-#[derive(Debug)]
-struct Node {
+/// Bounds of the children, a slot each, with their trigonometry done. Empty slots have no power. The GPU reads the same bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Node {
     centre: [[f32; WIDTH]; 3],
     radius_sq: [f32; WIDTH],
     axis: [[f32; WIDTH]; 3],
@@ -64,39 +69,34 @@ struct Node {
     sin_spread: [f32; WIDTH],
     cos_reach: [f32; WIDTH],
     power: [f32; WIDTH],
-    children: [Child; WIDTH],
+    /// A node, or an emitter with the bit [`LEAF`].
+    children: [u32; WIDTH],
     /// Node and slot that this one hangs from; the root's says itself.
-    parent: (u32, u32),
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Child {
-    Emitter(u32),
-    Node(u32),
+    parent: [u32; 2],
 }
 
 impl LightTree {
     /// Builds over emitters; those without power are never chosen.
     pub fn new(bounds: &[LightBounds]) -> Self {
-        let mut tree = Self { nodes: Vec::new(), place: vec![(0, 0); bounds.len()] };
+        let mut tree = Self { nodes: Vec::new(), place: vec![[0; 2]; bounds.len()] };
         if bounds.is_empty() {
             return tree;
         }
         let mut order: Vec<u32> = (0..bounds.len() as u32).collect();
-        tree.nodes.push(Node::empty((0, 0)));
+        tree.nodes.push(Node::empty([0; 2]));
         // (node, range of `order` that hangs from it)
         let mut todo = vec![(0, 0..order.len())];
         while let Some((node, range)) = todo.pop() {
             for (slot, (part, whole)) in parts(bounds, &mut order, range).into_iter().enumerate() {
-                let place = (node as u32, slot as u32);
+                let place = [node as u32, slot as u32];
                 tree.nodes[node].set(slot, &whole);
                 tree.nodes[node].children[slot] = if let [only] = order[part.clone()] {
                     tree.place[only as usize] = place;
-                    Child::Emitter(only)
+                    only | LEAF
                 } else {
                     tree.nodes.push(Node::empty(place));
                     todo.push((tree.nodes.len() - 1, part));
-                    Child::Node(tree.nodes.len() as u32 - 1)
+                    tree.nodes.len() as u32 - 1
                 };
             }
         }
@@ -121,29 +121,30 @@ impl LightTree {
             }
             u = (u / shares[slot]).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
             probability *= shares[slot];
-            match node.children[slot] {
-                Child::Emitter(emitter) => return Some((emitter, probability)),
-                Child::Node(child) => node = &self.nodes[child as usize],
+            let child = node.children[slot];
+            if child & LEAF != 0 {
+                return Some((child & !LEAF, probability));
             }
+            node = &self.nodes[child as usize];
         }
     }
 
     /// Probability with which [`LightTree::sample`] chooses `emitter`.
     pub fn probability(&self, receiver: &Receiver, emitter: u32) -> f32 {
-        let Some(&(mut node, mut slot)) = self.place.get(emitter as usize) else { return 0.0 };
+        let Some(&[mut node, mut slot]) = self.place.get(emitter as usize) else { return 0.0 };
         let mut probability = 1.0;
         loop {
             probability *= self.nodes[node as usize].shares(receiver)[slot as usize];
             if node == 0 || probability == 0.0 {
                 return probability;
             }
-            (node, slot) = self.nodes[node as usize].parent;
+            [node, slot] = self.nodes[node as usize].parent;
         }
     }
 }
 
 impl Node {
-    fn empty(parent: (u32, u32)) -> Self {
+    fn empty(parent: [u32; 2]) -> Self {
         let zero = [0.0; WIDTH];
         Self {
             centre: [zero; 3],
@@ -153,7 +154,7 @@ impl Node {
             sin_spread: zero,
             cos_reach: zero,
             power: zero,
-            children: [Child::Emitter(0); WIDTH],
+            children: [LEAF; WIDTH],
             parent,
         }
     }

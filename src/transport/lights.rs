@@ -18,18 +18,18 @@ use std::f32::consts::{FRAC_PI_2, PI};
 #[derive(Debug, Default)]
 pub struct Lights {
     /// What `tree` chooses from.
-    near: Vec<Near>,
-    tree: LightTree,
+    pub(crate) near: Vec<Near>,
+    pub(crate) tree: LightTree,
     /// For each of `Scene::emitters`: the first of its triangles in `near`; `None` for those that are no area lights.
-    first: Vec<Option<u32>>,
-    environments: Vec<Environment>,
+    pub(crate) first: Vec<Option<u32>>,
+    pub(crate) environments: Vec<Environment>,
     /// Directional emitters: indices into `Scene::emitters`.
-    suns: Vec<u32>,
+    pub(crate) suns: Vec<u32>,
 }
 
 /// An emitter, or a part of one, at a finite distance.
 #[derive(Debug)]
-enum Near {
+pub(crate) enum Near {
     Triangle(LightTriangle),
     /// Point or spot: index into `Scene::emitters`.
     Delta(u32),
@@ -37,19 +37,19 @@ enum Near {
 
 /// A triangle of an area light, all in one place.
 #[derive(Debug)]
-struct LightTriangle {
+pub(crate) struct LightTriangle {
     corners: [Vec3; 3],
     /// Unit geometric normal, which way it may point; zero for a triangle without area.
     normal: Vec3,
-    area: f32,
+    pub(crate) area: f32,
     /// Index into `Scene::emitters`.
-    emitter: u32,
+    pub(crate) emitter: u32,
     /// Index into `Geometry::triangles`.
-    index: u32,
+    pub(crate) index: u32,
 }
 
 #[derive(Debug)]
-enum Environment {
+pub(crate) enum Environment {
     Map(Envmap),
     Constant(Rgb),
 }

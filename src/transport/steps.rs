@@ -4,7 +4,7 @@
 #[derive(Debug, Clone)]
 pub struct Steps {
     /// From 0 to 1; one entry more than there are outcomes.
-    sums: Vec<f32>,
+    pub(crate) sums: Vec<f32>,
     /// For each of as many equal parts of [0, 1] as there are outcomes: the first step that may hold one of its numbers.
     guide: Vec<u32>,
 }

@@ -63,16 +63,16 @@ pub fn uv_at(geometry: &Geometry, hit: &Hit) -> Vec2 {
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(128))]
 pub struct Facet {
-    corners: [Vec3; 3],
+    pub(crate) corners: [Vec3; 3],
     /// Unit shading normals of the corners; `ng` thrice for face normals.
-    normals: [Vec3; 3],
-    uvs: [Vec2; 3],
-    ng: Vec3,
-    object: u32,
-    material: u32,
-    emitter: Option<NonZeroU32>,
+    pub(crate) normals: [Vec3; 3],
+    pub(crate) uvs: [Vec2; 3],
+    pub(crate) ng: Vec3,
+    pub(crate) object: u32,
+    pub(crate) material: u32,
+    pub(crate) emitter: Option<NonZeroU32>,
     /// Largest coordinate of the corners; negative where the object has no texture coordinates.
-    extent: f32,
+    pub(crate) extent: f32,
 }
 
 impl Facet {

@@ -15,7 +15,7 @@ pub struct World {
     pub bvh: Bvh,
     /// Its emitters, ready for sampling.
     pub lights: Lights,
-    facets: Vec<Facet>,
+    pub(crate) facets: Vec<Facet>,
 }
 
 impl World {

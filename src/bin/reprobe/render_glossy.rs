@@ -76,7 +76,7 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     if !kept {
         let pixels = cameras.iter().map(|c| c.size.iter().map(|&s| (s * supersample) as usize).product()).max().unwrap_or(0);
         renderer.gpu_filter = common.on_gpu(|gpu| Filter::new(gpu, &filter, pixels))?;
-        timings.gpu_filter = renderer.gpu_filter.as_ref().map(|f| f.device().to_owned());
+        timings.device = renderer.gpu_filter.as_ref().map(|f| f.device().to_owned());
     }
     let bar = common.progress();
     bar.start("glossy-probes", frames.len() as u64);

@@ -6,6 +6,7 @@ use crate::timings::{FrameTimings, Timings, timed};
 use crate::views::{FrameList, View, parse_frames, views};
 use anyhow::bail;
 use clap::ValueEnum;
+use reprobe::gpu::{GpuScene, PathTracer};
 use reprobe::io::{ExrImage, Provenance, atomic};
 use reprobe::progress::Progress;
 use reprobe::render::aov::with_first_hits;
@@ -15,6 +16,7 @@ use reprobe::transport::World;
 use reprobe::transport::path::PathParams;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Renders the frames of a camera path
 #[derive(clap::Args)]
@@ -100,10 +102,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     };
     match args.method {
         Method::GlossyProbes => render_glossy::run(args, common, timings),
-        Method::PathTrace => {
-            common.refuse_gpu()?;
-            run_path_trace(args, common, timings)
-        }
+        Method::PathTrace => run_path_trace(args, common, timings),
     }
 }
 
@@ -126,6 +125,9 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
     let (world, build_ms) = timed(|| World::new(scene));
     (timings.load_ms, timings.build_ms) = (load_ms, build_ms);
 
+    let tracer =
+        common.on_gpu(|gpu| PathTracer::new(Arc::new(GpuScene::new(gpu, &world)?), &params, args.layers == LayerChoice::All))?;
+    timings.device = tracer.as_ref().map(|t| t.device().to_owned());
     let bar = common.progress();
     bar.start("path-trace", views.iter().map(|v| u64::from(v.camera.size[1])).sum());
     for View { frame, camera } in &views {
@@ -141,16 +143,25 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
         } else {
             let image = ExrImage::new(camera.size[0] as usize, camera.size[1] as usize).with_provenance(provenance);
             let mut image = times.pass("path_trace", || match args.layers {
-                LayerChoice::Full => image.with_rgb("", &path_trace_full(&world, camera, &params, common.seed, *frame, &bar)),
+                LayerChoice::Full => {
+                    let full = match &tracer {
+                        Some(tracer) => tracer.full(camera, common.seed, *frame, &bar)?,
+                        None => path_trace_full(&world, camera, &params, common.seed, *frame, &bar),
+                    };
+                    anyhow::Ok(image.with_rgb("", &full))
+                }
                 LayerChoice::All => {
-                    let layers = path_trace(&world, camera, &params, common.seed, *frame, &bar);
-                    image
+                    let layers = match &tracer {
+                        Some(tracer) => tracer.layers(camera, common.seed, *frame, &bar)?,
+                        None => path_trace(&world, camera, &params, common.seed, *frame, &bar),
+                    };
+                    Ok(image
                         .with_rgb("", &layers.full())
                         .with_rgb("emission", &layers.emission)
                         .with_rgb("diffuse", &layers.diffuse)
-                        .with_rgb("glossy", &layers.glossy)
+                        .with_rgb("glossy", &layers.glossy))
                 }
-            });
+            })?;
             if args.aov.is_some() {
                 image = times.pass("aov", || with_first_hits(image, &world, camera));
             }

@@ -2,7 +2,7 @@
 
 use crate::common::{Common, Outcome, parse_size};
 use crate::probe_set;
-use reprobe::gpu::RayTracer;
+use reprobe::gpu::{GpuScene, RayTracer};
 use reprobe::io::Provenance;
 use reprobe::io::provenance::hash_file;
 use reprobe::probe::placement::ProbeGrid;
@@ -11,6 +11,7 @@ use reprobe::probe::seen::SeenBuffers;
 use reprobe::probe::set::{ProbeSet, numbered};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -69,7 +70,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let world = common.opaque_world(&args.scene)?;
     grid.provenance.check_scene(&args.probes, &world.scene.hash)?;
     let start = Instant::now();
-    let tracer = common.on_gpu(|gpu| RayTracer::new(gpu, &world))?;
+    let tracer = common.on_gpu(|gpu| RayTracer::new(Arc::new(GpuScene::new(gpu, &world)?)))?;
     let provenance =
         Provenance::new("resmap", &world.scene.hash, common.seed, &params).with_input("probes", hash_file(&args.probes)?);
     let set = ProbeSet { count: grid.len(), size: params.size, provenance };
@@ -84,7 +85,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
                 None => SeenBuffers::cast(&world, grid.position(i), params.size),
                 Some(tracer) => {
                     let rays = SeenBuffers::rays(grid.position(i), params.size);
-                    SeenBuffers::from_hits(&world, params.size, &rays, &tracer.closest(&world, &rays)?)
+                    SeenBuffers::from_hits(&world, params.size, &rays, &tracer.closest(&rays)?)
                 }
             };
             let map = resolution_map(&params, &seen);

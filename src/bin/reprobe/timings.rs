@@ -11,8 +11,8 @@ pub struct Timings {
     pub method: String,
     /// Worker threads.
     pub threads: usize,
-    /// The GPU that the filter ran on; `None` for the CPU. Its time is the host's, transfers included.
-    pub gpu_filter: Option<String>,
+    /// The GPU that the frames were made on, or glossy-probes' filter; `None` for the CPU. Its time is the host's, transfers included.
+    pub device: Option<String>,
     /// Scene loading, milliseconds.
     pub load_ms: f64,
     /// Acceleration structures, milliseconds.

@@ -24,8 +24,7 @@ type Table = Vec<Vec2>;
 
 /// Energy of a lobe with F = 1, and the cosine at which its Fresnel term is to be taken, for a view of cosine `cos` > 0.
 pub fn lobe_albedo(distribution: Distribution, alpha: f32, cos: f32) -> (f32, f32) {
-    static TABLES: [OnceLock<Table>; 2] = [OnceLock::new(), OnceLock::new()];
-    let table = TABLES[distribution as usize].get_or_init(|| tabulate(distribution));
+    let table = table(distribution);
     let x = cos.clamp(0.0, 1.0) * (COSINES - 1) as f32;
     let y = alpha.clamp(0.0, 1.0).sqrt() * (ALPHAS - 1) as f32;
     let (i, j) = ((x as usize).min(COSINES - 2), (y as usize).min(ALPHAS - 2));
@@ -33,6 +32,12 @@ pub fn lobe_albedo(distribution: Distribution, alpha: f32, cos: f32) -> (f32, f3
     let row = |j: usize| table[j * COSINES + i].lerp(table[j * COSINES + i + 1], fx);
     let at = row(j).lerp(row(j + 1), fy);
     (at.x, at.y)
+}
+
+/// Energy and cosine of every entry, a row of cosines an alpha.
+pub(crate) fn table(distribution: Distribution) -> &'static [Vec2] {
+    static TABLES: [OnceLock<Table>; 2] = [OnceLock::new(), OnceLock::new()];
+    TABLES[distribution as usize].get_or_init(|| tabulate(distribution))
 }
 
 fn tabulate(distribution: Distribution) -> Table {

@@ -31,7 +31,7 @@ impl Blend {
     }
 
     /// Whether only `a` or only `b` has a diffuse lobe, which then still factors.
-    fn only_diffuse(&self) -> Option<&Bsdf> {
+    pub(crate) fn only_diffuse(&self) -> Option<&Bsdf> {
         match (self.a.lobes().contains(Lobes::DIFFUSE), self.b.lobes().contains(Lobes::DIFFUSE)) {
             (true, false) => Some(&self.a),
             (false, true) => Some(&self.b),

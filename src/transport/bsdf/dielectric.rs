@@ -31,7 +31,7 @@ impl DielectricParams {
 pub struct Dielectric {
     /// Parameters as given.
     pub params: DielectricParams,
-    eta: f32,
+    pub(crate) eta: f32,
 }
 
 impl Dielectric {
@@ -83,7 +83,7 @@ impl Scatter for Dielectric {
 pub struct ThinDielectric {
     /// Parameters as given.
     pub params: DielectricParams,
-    eta: f32,
+    pub(crate) eta: f32,
 }
 
 impl ThinDielectric {

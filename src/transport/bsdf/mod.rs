@@ -3,7 +3,7 @@
 //! Semantics follow Mitsuba 3: `eval` includes the cosine of `wo`, `wi` is the viewer's side of the path tracer,
 //! one-sided models are black from behind, `twosided` mirrors them.
 
-mod albedo;
+pub(crate) mod albedo;
 pub mod blend;
 pub mod bump;
 pub mod conductor;

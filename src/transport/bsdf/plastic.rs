@@ -59,8 +59,8 @@ impl Colours {
 pub struct Plastic {
     /// Parameters as given.
     pub params: PlasticParams,
-    eta: f32,
-    internal_reflectance: f32,
+    pub(crate) eta: f32,
+    pub(crate) internal_reflectance: f32,
 }
 
 impl Plastic {

@@ -19,7 +19,7 @@ pub struct RoughDielectric {
     pub alpha_v: Texture,
     /// Microfacet family.
     pub distribution: Distribution,
-    eta: f32,
+    pub(crate) eta: f32,
 }
 
 /// The facet normal that turns `wi` into `wo`, on the side of +z, with d(solid angle of m) / d(solid angle of wo).

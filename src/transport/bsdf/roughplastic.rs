@@ -14,7 +14,7 @@ use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 
 /// Cosines at which the transmittance is tabulated, evenly from 0 to 1 (Mitsuba's count; it shows at grazing angles).
-const COSINES: usize = 64;
+pub(crate) const COSINES: usize = 64;
 /// Nodes of the quadrature behind an entry, each way; internal reflection has a kink at the critical angle.
 const EXTERNAL_NODES: usize = 32;
 const INTERNAL_NODES: usize = 24;
@@ -28,11 +28,11 @@ pub struct RoughPlastic {
     pub alpha: f32,
     /// Microfacet family.
     pub distribution: Distribution,
-    eta: f32,
-    transmittance: [f32; COSINES],
-    internal_reflectance: f32,
+    pub(crate) eta: f32,
+    pub(crate) transmittance: [f32; COSINES],
+    pub(crate) internal_reflectance: f32,
     /// 2 ∫ transmittance cos dcos.
-    mean_transmittance: f32,
+    pub(crate) mean_transmittance: f32,
 }
 
 impl RoughPlastic {

@@ -1,0 +1,25 @@
+// Lookups in the light map. Twin: src/lightmap/lookup.rs.
+
+// Transmitted irradiance at a point of a triangle.
+fn lightmap_lookup(triangle: u32, barycentric: vec2<f32>, back: bool) -> vec3<f32> {
+    let a = light_corners[3u * triangle];
+    if (back && scene.light_back == NONE) || !is_finite(a.x) {
+        return vec3(0.0);
+    }
+    let b = light_corners[3u * triangle + 1u];
+    let c = light_corners[3u * triangle + 2u];
+    let p = a + (b - a) * barycentric.x + (c - a) * barycentric.y;
+    let size = vec2(scene.light_width, scene.light_height);
+    let q = clamp(p - 0.5, vec2(0.0), vec2<f32>(size - 1u));
+    let low = vec2<u32>(q);
+    let high = min(low + 1u, size - 1u);
+    let f = q - vec2<f32>(low);
+    let above = mix(light_texel(low.x, low.y, back), light_texel(high.x, low.y, back), f.x);
+    let below = mix(light_texel(low.x, high.y, back), light_texel(high.x, high.y, back), f.x);
+    return mix(above, below, f.y);
+}
+
+fn light_texel(x: u32, y: u32, back: bool) -> vec3<f32> {
+    let at = select(0u, scene.light_back, back) + 3u * (y * scene.light_width + x);
+    return vec3(light_texels[at], light_texels[at + 1u], light_texels[at + 2u]);
+}

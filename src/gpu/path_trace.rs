@@ -1,0 +1,151 @@
+//! Path-traced frames: the twin of [`crate::render::path_trace`].
+
+use super::camera::GpuCamera;
+use super::follow::{Follow, MOST_STARTS, PathStart, Place, Purpose, SampleSum, WORKGROUP};
+use super::kernel::Kernel;
+use super::pace::Pace;
+use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
+use crate::Result;
+use crate::math::Rgb;
+use crate::progress::Progress;
+use crate::render::path_trace::{LayerImages, PathTraceParams};
+use crate::scene::Camera;
+use crate::transport::bsdf::{Lobes, Query};
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+/// `Params` of camera_hits.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct HitParams {
+    camera: GpuCamera,
+    seed: u32,
+    frame: u32,
+    first_pixel: u32,
+    pixels: u32,
+    first_sample: u32,
+    samples: u32,
+    padding: [u32; 2],
+}
+
+/// `Params` of add_samples.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct AddParams {
+    quantities: u32,
+    quantity: u32,
+    first_pixel: u32,
+    pixels: u32,
+    samples: u32,
+}
+
+/// A path tracer on a device.
+pub struct PathTracer {
+    scene: Arc<GpuScene>,
+    hits: Kernel,
+    add: Kernel,
+    /// One for each quantity but the emission: the halves of the first vertex, or the whole.
+    paths: Vec<Follow>,
+    params: PathTraceParams,
+}
+
+impl PathTracer {
+    /// Compiles it, for the layers or for the full image alone.
+    pub fn new(scene: Arc<GpuScene>, params: &PathTraceParams, layers: bool) -> Result<Self> {
+        let source = [
+            RAYS,
+            MATERIALS,
+            PATHS,
+            include_str!("../../shaders/start.wgsl"),
+            include_str!("../../shaders/camera.wgsl"),
+            include_str!("../../shaders/camera_hits.wgsl"),
+        ];
+        let hits = Kernel::in_scene(&scene, &source.concat(), "camera_hits", [1, 2], &[])?;
+        let add = Kernel::new(&scene.gpu, include_str!("../../shaders/add_samples.wgsl"), "add_samples")?;
+        // After the set that the camera ray has drawn.
+        let place = Place { branch: None, first_set: 1 };
+        let whole = Follow::new(scene.clone(), &params.path, Purpose::Scattering(Query::default()), place)?;
+        let half = |lobes, k| whole.half(lobes, Place { branch: Some(k), first_set: 0 });
+        let paths = if layers { vec![half(Lobes::DIFFUSE, 0), half(Lobes::NON_DIFFUSE, 1)] } else { vec![whole] };
+        Ok(Self { scene, hits, add, paths, params: *params })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        self.scene.device()
+    }
+
+    /// The full image, as [`crate::render::path_trace::path_trace_full`] renders it.
+    pub fn full(&self, camera: &Camera, seed: u32, frame: u32, progress: &dyn Progress) -> Result<Vec<Rgb>> {
+        let means = self.means(camera, [seed, frame], progress)?;
+        Ok(means.chunks_exact(2).map(|p| p[0] + p[1]).collect())
+    }
+
+    /// The layers, as [`crate::render::path_trace::path_trace`] renders them.
+    pub fn layers(&self, camera: &Camera, seed: u32, frame: u32, progress: &dyn Progress) -> Result<LayerImages> {
+        let means = self.means(camera, [seed, frame], progress)?;
+        let layer = |k: usize| means.iter().skip(k).step_by(3).copied().collect();
+        Ok(LayerImages { emission: layer(0), diffuse: layer(1), glossy: layer(2) })
+    }
+
+    /// Emission and what each of the paths carries, one after the other for every pixel.
+    fn means(&self, camera: &Camera, [seed, frame]: [u32; 2], progress: &dyn Progress) -> Result<Vec<Rgb>> {
+        let gpu = &self.scene.gpu;
+        let (pixels, spp) = ((camera.size[0] * camera.size[1]) as usize, self.params.spp);
+        let quantities = self.paths.len() + 1;
+        let sums = gpu.output("the frame", (pixels * quantities * size_of::<SampleSum>()) as u64)?;
+        let mut pace = Pace::new(4096);
+        let (mut sample, mut rows) = (0, 0);
+        while sample < spp {
+            let samples = (pace.pieces().min(MOST_STARTS) / pixels).clamp(1, (spp - sample) as usize) as u32;
+            let mut pixel = 0;
+            while pixel < pixels {
+                let run = (pace.pieces().min(MOST_STARTS) / samples as usize).max(1).min(pixels - pixel);
+                let params = HitParams {
+                    camera: camera.into(),
+                    seed,
+                    frame,
+                    first_pixel: pixel as u32,
+                    pixels: run as u32,
+                    first_sample: sample,
+                    samples,
+                    padding: [0; 2],
+                };
+                pace.run(run * samples as usize, || self.add_run(&params, &sums))?;
+                pixel += run;
+            }
+            sample += samples;
+            let reached = u64::from(camera.size[1]) * u64::from(sample) / u64::from(spp);
+            progress.advance(reached - rows);
+            rows = reached;
+        }
+        let scale = 1.0 / spp.max(1) as f32;
+        Ok(gpu.read::<SampleSum>(&sums)?.iter().map(|s| s.color() * scale).collect())
+    }
+
+    /// Adds samples of a run of pixels to their sums.
+    fn add_run(&self, params: &HitParams, frame: &wgpu::Buffer) -> Result<()> {
+        let gpu = &self.scene.gpu;
+        let count = (params.pixels * params.samples) as usize;
+        let starts = gpu.output("starts of paths", (count * size_of::<PathStart>()) as u64)?;
+        let values = gpu.output("samples", (count * size_of::<SampleSum>()) as u64)?;
+        let uniform = gpu.upload("the camera", bytemuck::bytes_of(params))?;
+        gpu.dispatch(&self.hits, &[&uniform, &starts, &values], [count.div_ceil(WORKGROUP) as u32, 1])?;
+        for quantity in 0..=self.paths.len() {
+            if let Some(paths) = quantity.checked_sub(1).map(|k| &self.paths[k]) {
+                paths.dispatch(&starts, &values, count, 0..1)?;
+            }
+            let add = AddParams {
+                quantities: self.paths.len() as u32 + 1,
+                quantity: quantity as u32,
+                first_pixel: params.first_pixel,
+                pixels: params.pixels,
+                samples: params.samples,
+            };
+            let add = gpu.upload("the sums' parameters", bytemuck::bytes_of(&add))?;
+            let groups = [(params.pixels as usize).div_ceil(WORKGROUP) as u32, 1];
+            gpu.dispatch(&self.add, &[&add, &values, frame], groups)?;
+        }
+        Ok(())
+    }
+}
