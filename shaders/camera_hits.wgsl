@@ -38,6 +38,6 @@ fn camera_hits(@builtin(global_invocation_id) id: vec3<u32>) {
             seen = emitted(surface);
         }
     }
-    starts[i] = PathStart(hit.triangle, hit.u, hit.v, stream, -ray.direction, index);
+    starts[i] = PathStart(hit.triangle, hit.u, hit.v, stream, -ray.direction, index, index + 1u);
     emission[i] = vec4(keep_finite(seen), 0.0);
 }

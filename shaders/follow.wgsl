@@ -7,7 +7,8 @@ struct Params {
     roughness_scale: f32,
     split: u32,
     starts: u32,
-    first_sample: u32,
+    // Of each start's samples, the first in this dispatch, and the most.
+    skipped: u32,
     samples: u32,
     // Branch of each stream, or NONE, and the first set of dimensions.
     branch: u32,
@@ -32,8 +33,9 @@ fn follow(@builtin(global_invocation_id) id: vec3<u32>) {
     let hit = Hit(0.0, from_here.triangle, from_here.u, from_here.v);
     let start = Start(hit, from_here.wo, Query(params.lobes, params.roughness_scale), from_here.wo.x, params.split != 0u);
     var sum = vec4(0.0);
-    for (var k = 0u; k < params.samples; k++) {
-        var s = sampler_new(from_here.stream, from_here.index + params.first_sample + k);
+    let first = from_here.first + params.skipped;
+    for (var k = first; k < min(first + params.samples, from_here.end); k++) {
+        var s = sampler_new(from_here.stream, k);
         if params.branch != NONE {
             s = branch(s, params.branch);
         }

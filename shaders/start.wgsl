@@ -7,6 +7,7 @@ struct PathStart {
     stream: u32,
     // Towards the viewer, world; for light that a light map collects, x says on which side of the normal.
     wo: vec3<f32>,
-    // Number of its first sample.
-    index: u32,
+    // Its samples, from `first` to before `end`.
+    first: u32,
+    end: u32,
 }

@@ -62,8 +62,8 @@ impl Setup {
             .map(|i| {
                 let corner = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) - 0.5;
                 let mut probe = probe_geometry(&world, centre + corner * spacing, ParameterMap::identity([width, width / 2]));
-                let bake = Bake { world: &world, params: &params, seed: 0, lightmap: None };
-                bake_glossy(&bake, &mut probe, i, &|_| true, &Silent);
+                let bake = Bake { world: &world, params: &params, seed: 0, lightmap: None, gpu: None };
+                bake_glossy(&bake, &mut probe, i, &|_| true, &Silent).unwrap();
                 probe
             })
             .collect();
@@ -217,8 +217,14 @@ fn adaptive_sampling_spends_paths_where_they_are_needed() {
         let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{lift}{reflector}</shape>"#)));
         let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([64, 32]));
         let params = BakeParams { spp: MOST, error, ..BakeParams::default() };
-        let traced =
-            bake_glossy(&Bake { world: &world, params: &params, seed, lightmap: None }, &mut probe, 0, &|_| true, &Silent);
+        let traced = bake_glossy(
+            &Bake { world: &world, params: &params, seed, lightmap: None, gpu: None },
+            &mut probe,
+            0,
+            &|_| true,
+            &Silent,
+        )
+        .unwrap();
         let glossy: Vec<Vec3> = probe.texels.iter().map(|t| t.glossy()).collect();
         (traced, glossy)
     };

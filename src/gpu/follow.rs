@@ -9,13 +9,9 @@ use crate::transport::bsdf::{Lobes, Query};
 use crate::transport::path::PathParams;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use std::ops::Range;
 use std::sync::Arc;
 
 pub(super) const WORKGROUP: usize = 64;
-
-/// Most starts a dispatch: WebGPU's most workgroups along a line.
-pub(super) const MOST_STARTS: usize = 65_535 * WORKGROUP;
 
 /// `PathStart` of start.wgsl.
 #[repr(C)]
@@ -29,8 +25,12 @@ pub struct PathStart {
     pub stream: u32,
     /// Unit direction towards the viewer, world.
     pub wo: [f32; 3],
-    /// Number of the first sample.
-    pub index: u32,
+    /// Number of its first sample.
+    pub first: u32,
+    /// Number after its last one.
+    pub end: u32,
+    /// As WGSL lays it out.
+    pub padding: [u32; 3],
 }
 
 /// What paths are followed for.
@@ -52,7 +52,7 @@ struct Params {
     roughness_scale: f32,
     split: u32,
     starts: u32,
-    first_sample: u32,
+    skipped: u32,
     samples: u32,
     branch: u32,
     first_set: u32,
@@ -69,6 +69,11 @@ pub struct SampleSum {
 }
 
 impl SampleSum {
+    fn add(&mut self, more: &Self) {
+        self.color = (self.color() + more.color()).to_array();
+        self.squares += more.squares;
+    }
+
     /// The sum of radiance.
     pub fn color(&self) -> Rgb {
         Vec3::from_array(self.color)
@@ -113,7 +118,7 @@ impl Follow {
             roughness_scale: query.roughness_scale,
             split: u32::from(query.lobes != Lobes::ALL || purpose == Purpose::Irradiance),
             starts: 0,
-            first_sample: 0,
+            skipped: 0,
             samples: 0,
             branch: place.branch.unwrap_or(u32::MAX),
             first_set: place.first_set,
@@ -128,41 +133,67 @@ impl Follow {
         Self { params, ..self.clone() }
     }
 
-    /// Adds these samples of the first `count` of `starts` to `sums`, in one dispatch.
-    pub fn dispatch(&self, starts: &wgpu::Buffer, sums: &wgpu::Buffer, count: usize, samples: Range<u32>) -> Result<()> {
+    /// Adds the samples of the first `count` of `starts` to `sums`, in one dispatch: of each those from `skipped` on, so many at the most.
+    pub fn dispatch(&self, starts: &wgpu::Buffer, sums: &wgpu::Buffer, count: usize, [skipped, samples]: [u32; 2]) -> Result<()> {
         let gpu = &self.scene.gpu;
-        let params =
-            Params { starts: count as u32, first_sample: samples.start, samples: samples.end - samples.start, ..self.params };
+        let params = Params { starts: count as u32, skipped, samples, ..self.params };
         let params = gpu.upload("parameters of paths", bytemuck::bytes_of(&params))?;
         gpu.dispatch(&self.kernel, &[&params, starts, sums], [count.div_ceil(WORKGROUP) as u32, 1])
     }
 
-    /// Sums over these samples of every start, in dispatches of a length that `pace` has learnt. `done` hears of the samples of each.
-    pub fn sums(
+    /// Sums over all samples of every start, in dispatches of a length that `pace` has learnt. `done` hears how many more paths are done.
+    pub fn sums(&self, starts: &[PathStart], pace: &mut Pace, done: &dyn Fn(usize)) -> Result<Vec<SampleSum>> {
+        let mut sums = vec![SampleSum::default(); starts.len()];
+        let samples = |i: &usize| starts[*i].end.saturating_sub(starts[*i].first);
+        let mut todo: Vec<usize> = (0..starts.len()).collect();
+        let mut skipped = 0;
+        loop {
+            todo.retain(|i| samples(i) > skipped);
+            let Some(most) = todo.iter().map(samples).max() else { return Ok(sums) };
+            let least = todo.iter().map(samples).min().unwrap_or(most);
+            // Where they differ, those that are done make room for the others again and again.
+            let until = if least == most { most } else { (2 * skipped).max(least).min(most) };
+            for part in todo.chunks(most_starts(&self.scene)) {
+                self.round(starts, part, [skipped, until], pace, &mut sums, done)?;
+            }
+            skipped = until;
+        }
+    }
+
+    /// The samples of a round from those starts that are left.
+    fn round(
         &self,
         starts: &[PathStart],
-        samples: Range<u32>,
+        mut part: &[usize],
+        [from, until]: [u32; 2],
         pace: &mut Pace,
+        sums: &mut [SampleSum],
         done: &dyn Fn(usize),
-    ) -> Result<Vec<SampleSum>> {
+    ) -> Result<()> {
         let gpu = &self.scene.gpu;
-        let mut all = Vec::with_capacity(starts.len());
-        let mut rest = starts;
-        while !rest.is_empty() {
-            let (now, later) = rest.split_at(rest.len().min(pace.pieces()).min(MOST_STARTS));
-            let uploaded = gpu.upload("starts of paths", bytemuck::cast_slice(now))?;
-            let sums = gpu.output("sums over paths", size_of_val(now) as u64 / 2)?;
-            let mut next = samples.start;
-            while next < samples.end {
-                let count = ((pace.pieces() / now.len()).max(1) as u32).min(samples.end - next);
-                let pieces = now.len() * count as usize;
-                pace.run(pieces, || self.dispatch(&uploaded, &sums, now.len(), next..next + count))?;
-                next += count;
-                done(pieces);
+        while !part.is_empty() {
+            let (now, later) = part.split_at(part.len().min(pace.pieces()));
+            let list: Vec<PathStart> = now.iter().map(|&i| starts[i]).collect();
+            let uploaded = gpu.upload("starts of paths", bytemuck::cast_slice(&list))?;
+            let output = gpu.output("sums over paths", (now.len() * size_of::<SampleSum>()) as u64)?;
+            let mut skipped = from;
+            while skipped < until {
+                let samples = ((pace.pieces() / now.len()).max(1) as u32).min(until - skipped);
+                let paths = now.len() * samples as usize;
+                pace.run(paths, || self.dispatch(&uploaded, &output, now.len(), [skipped, samples]))?;
+                skipped += samples;
+                done(paths);
             }
-            all.extend(gpu.read::<SampleSum>(&sums)?);
-            rest = later;
+            for (&i, more) in now.iter().zip(gpu.read::<SampleSum>(&output)?) {
+                sums[i].add(&more);
+            }
+            part = later;
         }
-        Ok(all)
+        Ok(())
     }
+}
+
+/// Most starts a dispatch: WebGPU's most workgroups along a line, and what a kernel can bind.
+pub(super) fn most_starts(scene: &GpuScene) -> usize {
+    (65_535 * WORKGROUP).min(scene.gpu.adapter.max_binding as usize / size_of::<PathStart>())
 }

@@ -8,13 +8,18 @@ mod device;
 mod filter;
 mod follow;
 mod kernel;
+mod light;
 mod pace;
 mod path_trace;
+mod probe;
 mod rays;
 mod scene;
 
 pub use device::{Adapter, Choice, Gpu, adapters};
 pub use filter::Filter;
+pub(crate) use follow::{PathStart, SampleSum};
+pub use light::{LightPaths, LightStart};
 pub use path_trace::PathTracer;
+pub use probe::ProbePaths;
 pub use rays::RayTracer;
 pub use scene::GpuScene;

@@ -1,7 +1,7 @@
 //! Path-traced frames: the twin of [`crate::render::path_trace`].
 
 use super::camera::GpuCamera;
-use super::follow::{Follow, MOST_STARTS, PathStart, Place, Purpose, SampleSum, WORKGROUP};
+use super::follow::{Follow, PathStart, Place, Purpose, SampleSum, WORKGROUP, most_starts};
 use super::kernel::Kernel;
 use super::pace::Pace;
 use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
@@ -94,13 +94,14 @@ impl PathTracer {
         let (pixels, spp) = ((camera.size[0] * camera.size[1]) as usize, self.params.spp);
         let quantities = self.paths.len() + 1;
         let sums = gpu.output("the frame", (pixels * quantities * size_of::<SampleSum>()) as u64)?;
+        let most = most_starts(&self.scene);
         let mut pace = Pace::new(4096);
         let (mut sample, mut rows) = (0, 0);
         while sample < spp {
-            let samples = (pace.pieces().min(MOST_STARTS) / pixels).clamp(1, (spp - sample) as usize) as u32;
+            let samples = (pace.pieces().min(most) / pixels).clamp(1, (spp - sample) as usize) as u32;
             let mut pixel = 0;
             while pixel < pixels {
-                let run = (pace.pieces().min(MOST_STARTS) / samples as usize).max(1).min(pixels - pixel);
+                let run = (pace.pieces().min(most) / samples as usize).max(1).min(pixels - pixel);
                 let params = HitParams {
                     camera: camera.into(),
                     seed,
@@ -133,7 +134,7 @@ impl PathTracer {
         gpu.dispatch(&self.hits, &[&uniform, &starts, &values], [count.div_ceil(WORKGROUP) as u32, 1])?;
         for quantity in 0..=self.paths.len() {
             if let Some(paths) = quantity.checked_sub(1).map(|k| &self.paths[k]) {
-                paths.dispatch(&starts, &values, count, 0..1)?;
+                paths.dispatch(&starts, &values, count, [0, 1])?;
             }
             let add = AddParams {
                 quantities: self.paths.len() as u32 + 1,

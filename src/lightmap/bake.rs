@@ -6,17 +6,18 @@
 //! of the second read diffuse light from its map, one bounce away, where the mean over many texels hides their noise.
 
 use super::adjacency::adjacency;
-use super::parts::{Record, Store};
+use super::parts::Store;
 use super::solid::{Orientation, mark_solids};
 use super::texels::Texels;
-use super::visible::{View, Visibility, facing};
+use super::visible::{Visibility, facing};
 use super::{Atlas, AtlasParams, LightMap, fill, lookup, seam};
+use crate::gpu::LightPaths;
 use crate::math::{Rgb, hash_words};
 use crate::progress::Progress;
 use crate::scene::{Emitter, Scene};
+use crate::transport::World;
 use crate::transport::bsdf::Lobes;
-use crate::transport::path::{KnownDiffuse, PathParams, transmitted_irradiance};
-use crate::transport::{Sampler, Surface, World};
+use crate::transport::path::PathParams;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -25,25 +26,22 @@ use serde::{Deserialize, Serialize};
 /// Texels a block.
 pub const BLOCK: usize = 4096;
 
+/// Blocks that a GPU bakes at once.
+const GPU_BLOCKS: usize = 16;
+
 /// Samples that decide what a texel sees, and whether a back is lit at all.
-const FIRST_SAMPLES: u32 = 16;
+pub(super) const FIRST_SAMPLES: u32 = 16;
 
 /// Texels of a chart's back that are asked whether it is lit. All of most charts; of a large wall so many that a lit patch
 /// of a four-thousandth of it is found. All of kitchen's dark backs would take longer than a draft.
 const LIT_TEXELS: usize = 4096;
 
-/// Most sample points tried for each one that counts, in a texel that is hidden in part.
-const TRIES: u32 = 4;
-
-/// Most regions of a texel that are told apart.
-const MAX_REGIONS: usize = 4;
-
 /// The value comes from samples in the open.
-const OPEN: u32 = 1;
+pub(super) const OPEN: u32 = 1;
 /// The value comes from samples pressed against other geometry.
-const CONTACT: u32 = 2;
+pub(super) const CONTACT: u32 = 2;
 /// A dark part of the texel was left out.
-const SPLIT: u32 = 4;
+pub(super) const SPLIT: u32 = 4;
 
 /// All parameters of a bake but the seed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -76,12 +74,12 @@ pub struct Baked {
 
 /// A bake that is ready to start: what is sampled where.
 pub struct Plan<'a> {
-    world: &'a World,
-    params: BakeParams,
+    pub(super) world: &'a World,
+    pub(super) params: BakeParams,
     seed: u32,
     /// The atlas.
     pub atlas: Atlas,
-    texels: Texels,
+    pub(super) texels: Texels,
     orientation: Orientation,
     /// Charts with a front and a back to bake.
     active: Vec<[bool; 2]>,
@@ -93,10 +91,19 @@ pub struct Plan<'a> {
 #[derive(Clone, Copy)]
 pub struct Pass<'a> {
     /// Samples a texel.
-    spp: u32,
-    seed: u32,
+    pub(super) spp: u32,
+    pub(super) seed: u32,
     /// Where paths read diffuse light.
-    known: Option<&'a LightMap>,
+    pub(super) known: Option<&'a LightMap>,
+    /// Where they are followed; `None` for the CPU.
+    gpu: Option<&'a LightPaths>,
+}
+
+impl<'a> Pass<'a> {
+    /// The same pass, its paths followed on a GPU, whose scene has the light map that they read.
+    pub fn on_gpu(self, gpu: Option<&'a LightPaths>) -> Self {
+        Self { gpu, ..self }
+    }
 }
 
 impl<'a> Plan<'a> {
@@ -124,12 +131,12 @@ impl<'a> Plan<'a> {
     /// The pass that traces a few paths in full, for the second to read its map; `None` if the second shall do without.
     pub fn first_pass(&self) -> Option<Pass<'static>> {
         let spp = self.params.first_spp;
-        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None })
+        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None, gpu: None })
     }
 
     /// The pass whose map counts; its paths read diffuse light from `known` and are traced in full without it.
     pub fn second_pass<'k>(&self, known: Option<&'k LightMap>) -> Pass<'k> {
-        Pass { spp: self.params.spp, seed: self.seed, known }
+        Pass { spp: self.params.spp, seed: self.seed, known, gpu: None }
     }
 
     /// Texel sides to bake.
@@ -160,26 +167,23 @@ impl<'a> Plan<'a> {
     pub fn run(&self, pass: &Pass, store: &dyn Store, mine: &dyn Fn(u32) -> bool, progress: &dyn Progress) -> Result<u32> {
         let blocks: Vec<u32> = (0..self.blocks()).filter(|&b| mine(b)).collect();
         progress.start("Light map", blocks.iter().map(|&b| self.block(b).len() as u64).sum());
-        let mut found = 0;
-        for b in blocks {
-            let items = self.block(b);
-            if self.has(store, b) {
-                found += 1;
-                progress.advance(items.len() as u64);
-                continue;
+        let (kept, todo): (Vec<u32>, Vec<u32>) = blocks.into_iter().partition(|&b| self.has(store, b));
+        for &b in &kept {
+            progress.advance(self.block(b).len() as u64);
+        }
+        // A GPU is fed with many texels at once.
+        for group in todo.chunks(if pass.gpu.is_some() { GPU_BLOCKS } else { 1 }) {
+            let items: Vec<(u32, bool)> = group.iter().flat_map(|&b| self.block(b)).copied().collect();
+            let records = match pass.gpu {
+                None => items.par_iter().map(|&(texel, back)| self.texel(pass, texel as usize, back, progress)).collect(),
+                Some(gpu) => self.texels_on(gpu, pass, &items, progress)?,
+            };
+            for (&b, records) in group.iter().zip(records.chunks(BLOCK)) {
+                store.put(b, records)?;
             }
-            let records: Vec<Record> = items
-                .par_iter()
-                .map(|&(texel, back)| {
-                    let record = self.texel(pass, texel as usize, back);
-                    progress.advance(1);
-                    record
-                })
-                .collect();
-            store.put(b, &records)?;
         }
         progress.finish();
-        Ok(found)
+        Ok(kept.len() as u32)
     }
 
     /// Whether `store` has a finished block.
@@ -261,88 +265,8 @@ impl<'a> Plan<'a> {
         }
     }
 
-    fn visibility(&self) -> Visibility<'_> {
+    pub(super) fn visibility(&self) -> Visibility<'_> {
         Visibility { world: self.world, atlas: &self.atlas, texels: &self.texels, orientation: &self.orientation }
-    }
-
-    /// Sample `i` of a texel: its place and the rest of its random numbers.
-    fn draw(&self, pass: &Pass, texel: usize, back: bool, i: u32) -> (Surface, Sampler) {
-        let stream = hash_words(&[pass.seed, u32::from(back), self.texels.pixel[texel]]);
-        let mut sampler = Sampler::new(stream, i);
-        (self.visibility().sample(texel, sampler.next_2d()), sampler)
-    }
-
-    fn light(&self, pass: &Pass, surface: &Surface, back: bool, mut sampler: Sampler) -> Rgb {
-        let known = pass.known.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&self.world.scene, s, wo));
-        let known = known.as_ref().map(|known| known as KnownDiffuse);
-        // The path starts with a set of dimensions of its own, whether the view was tested or not.
-        transmitted_irradiance(self.world, surface, back, known, &self.params.path, &mut sampler)
-    }
-
-    /// One texel's value and flags.
-    fn texel(&self, pass: &Pass, texel: usize, back: bool) -> Record {
-        let visibility = self.visibility();
-        let first: Vec<_> = (0..FIRST_SAMPLES).map(|i| self.draw(pass, texel, back, i)).collect();
-        let views: Vec<View> = first.iter().map(|(s, sampler)| visibility.view(s, back, &mut sampler.clone())).collect();
-        let best = views.iter().max().copied().unwrap_or(View::Inside);
-        if best == View::Inside {
-            return record(Rgb::ZERO, 0);
-        }
-        let plain = views.iter().all(|&v| v == best)
-            && (best == View::Contact || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
-        if !plain {
-            return self.hidden_in_part(pass, texel, back, best);
-        }
-        let sum: Rgb = (0..pass.spp)
-            .map(|i| {
-                let (surface, sampler) = self.draw(pass, texel, back, i);
-                self.light(pass, &surface, back, sampler)
-            })
-            .sum();
-        record(sum / pass.spp as f32, if best == View::Open { OPEN } else { CONTACT })
-    }
-
-    /// A texel of which some samples are hidden, or lie in several regions: see [`super::visible`].
-    fn hidden_in_part(&self, pass: &Pass, texel: usize, back: bool, wanted: View) -> Record {
-        struct Region {
-            at: Surface,
-            sum: Rgb,
-            count: u32,
-        }
-        let visibility = self.visibility();
-        let mut regions: Vec<Region> = Vec::new();
-        let mut count = 0;
-        for i in 0..pass.spp.saturating_mul(TRIES).max(FIRST_SAMPLES) {
-            let (surface, mut sampler) = self.draw(pass, texel, back, i);
-            if visibility.view(&surface, back, &mut sampler) != wanted {
-                continue;
-            }
-            let mut region = regions.iter().position(|r| visibility.together(&r.at, &surface, back));
-            if region.is_none() && regions.len() < MAX_REGIONS {
-                regions.push(Region { at: surface, sum: Rgb::ZERO, count: 0 });
-                region = Some(regions.len() - 1);
-            }
-            let Some(region) = region else { continue };
-            regions[region].sum += self.light(pass, &surface, back, sampler);
-            regions[region].count += 1;
-            count += 1;
-            if count >= pass.spp {
-                break;
-            }
-        }
-        let flag = if wanted == View::Open { OPEN } else { CONTACT };
-        let mut lit: Vec<&Region> = regions.iter().filter(|r| r.sum != Rgb::ZERO).collect();
-        let split = if lit.len() < regions.len() && !lit.is_empty() { SPLIT } else { 0 };
-        if lit.len() > 1 {
-            let near: Vec<bool> = lit.iter().map(|r| visibility.near_sensor(&r.at, back)).collect();
-            if near.contains(&true) {
-                let mut keep = near.iter();
-                lit.retain(|_| *keep.next().unwrap_or(&true));
-            }
-        }
-        // The largest; the first of equals.
-        let chosen = lit.into_iter().rev().max_by_key(|r| r.count);
-        record(chosen.map_or(Rgb::ZERO, |r| r.sum / r.count as f32), flag | split)
     }
 
     /// Which sides of each chart are baked: not those that face into a solid, not the backs of one-sided materials,
@@ -393,10 +317,6 @@ impl Side {
         let n = (plan.atlas.size[0] * plan.atlas.size[1]) as usize;
         Self { pixels: vec![Rgb::ZERO; n], flags: vec![0; n] }
     }
-}
-
-fn record(value: Rgb, flags: u32) -> Record {
-    [value.x.to_bits(), value.y.to_bits(), value.z.to_bits(), flags]
 }
 
 /// The solids of a scene. Masked objects have holes and transmissive ones let light in: they are none.

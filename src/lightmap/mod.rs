@@ -18,6 +18,7 @@ pub mod bake;
 #[cfg(test)]
 mod bake_tests;
 pub mod chart;
+mod choice;
 pub mod fill;
 pub mod lookup;
 pub mod pack;

@@ -2,17 +2,20 @@
 
 use super::file::{NO_TRIANGLE, Probe, Texel};
 use super::qhmap::ParameterMap;
+use crate::Result;
+use crate::gpu::{PathStart, ProbePaths, SampleSum};
 use crate::lightmap::LightMap;
 use crate::math::{Rgb, hash_words, luminance};
 use crate::progress::Progress;
 use crate::render::mirror::mirror_hit;
 use crate::transport::bsdf::{Lobes, Query};
 use crate::transport::path::{KnownDiffuse, PathParams, scattered};
-use crate::transport::{Ray, Sampler, Surface, World};
+use crate::transport::{Hit, Ray, Sampler, Surface, World};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Parameters of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -83,6 +86,8 @@ pub struct Bake<'a> {
     pub seed: u32,
     /// Diffuse light of the scene, read where a path leaves the glossy chain. *Ours*: the paper traces on.
     pub lightmap: Option<&'a LightMap>,
+    /// Where the paths are followed; `None` for the CPU.
+    pub gpu: Option<&'a ProbePaths>,
 }
 
 /// What was traced for a probe.
@@ -113,57 +118,137 @@ impl Sums {
     }
 }
 
+/// What the centre of a texel sees: where its paths begin.
+struct Centre {
+    texel: u32,
+    hit: Hit,
+    stream: u32,
+}
+
 /// Fills the glossy map: L(S|D)*S+E with the first vertex' roughness reduced. Texels for which `wanted` does not hold stay black.
 /// The random stream of a texel is a hash of (seed, probe index, texel), so that no thread count changes a bit.
 ///
 /// Adaptive sampling decides from the first [`PILOT`] paths of a texel and of its neighbours together. Stopping as soon as the texel's own
 /// paths agree would favour those that have missed a rare bright path so far.
+///
+/// # Errors
+/// What goes wrong on a GPU.
 pub fn bake_glossy(
     bake: &Bake,
     probe: &mut Probe,
     index: u32,
     wanted: &(dyn Fn(u32) -> bool + Sync),
     progress: &dyn Progress,
-) -> Traced {
-    let Probe { position, texels, map, .. } = probe;
-    let (width, map) = (map.size[0], &*map);
-    let sees = |i: u32| texels[i as usize].triangle != NO_TRIANGLE && wanted(i);
-    let trace = |i: u32, samples: Range<u32>| {
-        sees(i).then(|| glossy_texel(bake, *position, map, i, hash_words(&[bake.seed, index, i]), samples)).flatten()
-    };
-    let count = texels.len() as u32;
-    let each = |texel: &(dyn Fn(u32) -> Option<Sums> + Sync), progress: Option<&dyn Progress>| -> Vec<Option<Sums>> {
-        let row = |y: u32| {
-            let row: Vec<_> = (y * width..(y + 1) * width).map(texel).collect();
-            if let Some(progress) = progress {
-                progress.advance(1);
-            }
-            row
-        };
-        (0..count / width).into_par_iter().flat_map_iter(row).collect()
-    };
+) -> Result<Traced> {
     let most = bake.params.spp;
+    let centres = centres(bake, probe, index, wanted);
     let sums = match bake.params.error {
-        None => each(&|i| trace(i, 0..most), Some(progress)),
+        None => trace(bake, probe, &centres, &|_| 0..most, Some(progress))?,
         Some(error) => {
-            let pilot = each(&|i| trace(i, 0..PILOT.min(most)), None);
-            let rest = |i: u32| {
-                let first = pilot[i as usize]?;
-                let paths = paths_for(error, most, &pilot, i, width);
-                if paths > first.paths { trace(i, first.paths..paths).map(|more| first.and(more)) } else { Some(first) }
-            };
-            each(&rest, Some(progress))
+            let first = trace(bake, probe, &centres, &|_| 0..PILOT.min(most), None)?;
+            let mut pilot = vec![None; probe.texels.len()];
+            for (centre, sums) in centres.iter().zip(&first) {
+                pilot[centre.texel as usize] = Some(*sums);
+            }
+            let width = probe.map.size[0];
+            let paths: Vec<u32> = centres.iter().map(|c| paths_for(error, most, &pilot, c.texel, width)).collect();
+            let rest = trace(bake, probe, &centres, &|i| PILOT.min(most)..paths[i], Some(progress))?;
+            first.into_iter().zip(rest).map(|(first, rest)| first.and(rest)).collect()
         }
     };
     let mut traced = Traced::default();
-    for (texel, sums) in texels.iter_mut().zip(sums) {
-        if let Some(sums) = sums {
-            texel.set_glossy(sums.color / sums.paths as f32);
-            traced.texels += 1;
-            traced.paths += u64::from(sums.paths);
+    for (centre, sums) in centres.iter().zip(sums) {
+        probe.texels[centre.texel as usize].set_glossy(sums.color / sums.paths as f32);
+        traced.texels += 1;
+        traced.paths += u64::from(sums.paths);
+    }
+    Ok(traced)
+}
+
+/// The wanted texels whose centres see a glossy surface.
+fn centres(bake: &Bake, probe: &Probe, index: u32, wanted: &(dyn Fn(u32) -> bool + Sync)) -> Vec<Centre> {
+    let Probe { position, texels, map, .. } = probe;
+    let sees = |i: &u32| texels[*i as usize].triangle != NO_TRIANGLE && wanted(*i);
+    let centre = |texel| {
+        let d = direction(map, texel, Vec2::splat(0.5));
+        let hit = bake.world.closest(&Ray::new(*position, d))?;
+        let stream = hash_words(&[bake.seed, index, texel]);
+        is_glossy(bake.world, &bake.world.surface(&hit), -d).then_some(Centre { texel, hit, stream })
+    };
+    (0..texels.len() as u32).into_par_iter().filter(sees).filter_map(centre).collect()
+}
+
+/// Sums over the samples `range(i)` of each of the centres. Tells `progress` of as many units as the map has rows.
+fn trace(
+    bake: &Bake,
+    probe: &Probe,
+    centres: &[Centre],
+    range: &(dyn Fn(usize) -> Range<u32> + Sync),
+    progress: Option<&dyn Progress>,
+) -> Result<Vec<Sums>> {
+    let all: u64 = (0..centres.len()).map(|i| range(i).len() as u64).sum();
+    let rows = Rows { rows: u64::from(probe.map.size[1]), all, done: AtomicU64::new(0), progress };
+    let sums = match bake.gpu {
+        None => {
+            let texel = |(i, centre)| {
+                let sums = glossy_texel(bake, probe, centre, range(i));
+                rows.advance(sums.paths.into());
+                sums
+            };
+            centres.par_iter().enumerate().map(texel).collect()
+        }
+        Some(gpu) => {
+            let starts: Vec<PathStart> = centres
+                .iter()
+                .enumerate()
+                .map(|(i, centre)| {
+                    let Range { start: first, end } = range(i);
+                    let Hit { triangle, u, v, .. } = centre.hit;
+                    let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
+                    let (barycentric, stream) = ([u, v], centre.stream);
+                    PathStart { triangle, barycentric, stream, wo: wo.into(), first, end, padding: [0; 3] }
+                })
+                .collect();
+            let sums = gpu.sums(&starts, &|paths| rows.advance(paths as u64))?;
+            let of = |(start, sum): (&PathStart, SampleSum)| Sums {
+                paths: start.end.saturating_sub(start.first),
+                color: sum.color(),
+                moments: [luminance(sum.color()), sum.squares].map(f64::from),
+            };
+            starts.iter().zip(sums).map(of).collect()
+        }
+    };
+    rows.finish();
+    Ok(sums)
+}
+
+/// Tells of paths in rows of the probe, whatever they are.
+struct Rows<'a> {
+    rows: u64,
+    all: u64,
+    done: AtomicU64,
+    progress: Option<&'a dyn Progress>,
+}
+
+impl Rows<'_> {
+    fn advance(&self, paths: u64) {
+        let before = self.done.fetch_add(paths, Ordering::Relaxed);
+        let reached = |done: u64| (done.min(self.all) as f64 / self.all.max(1) as f64 * self.rows as f64) as u64;
+        self.tell(reached(before + paths) - reached(before));
+    }
+
+    /// A probe without paths has rows all the same.
+    fn finish(&self) {
+        if self.all == 0 {
+            self.tell(self.rows);
         }
     }
-    traced
+
+    fn tell(&self, rows: u64) {
+        if let Some(progress) = self.progress.filter(|_| rows > 0) {
+            progress.advance(rows);
+        }
+    }
 }
 
 /// Paths that bring a texel's standard error down to `error`, by the variance of its pilot paths and its neighbours' about their texels'
@@ -189,21 +274,20 @@ fn paths_for(error: f32, most: u32, pilot: &[Option<Sums>], i: u32, width: u32) 
     ((squares / degrees / (allowed * allowed)).ceil() as u32).clamp(PILOT.min(most), most)
 }
 
-/// Sums over those of the texel's paths; `None` where its centre sees no glossy surface.
-fn glossy_texel(bake: &Bake, position: Vec3, map: &ParameterMap, texel: u32, stream: u32, samples: Range<u32>) -> Option<Sums> {
+/// Sums over those of the texel's paths.
+fn glossy_texel(bake: &Bake, probe: &Probe, of: &Centre, samples: Range<u32>) -> Sums {
     let Bake { world, params, .. } = *bake;
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: params.roughness_scale };
-    let to_centre = direction(map, texel, Vec2::splat(0.5));
-    let centre = world.intersect(&Ray::new(position, to_centre)).filter(|s| is_glossy(world, s, -to_centre))?;
+    let (centre, to_centre) = (world.surface(&of.hit), direction(&probe.map, of.texel, Vec2::splat(0.5)));
     let known = bake.lightmap.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&world.scene, s, wo));
     let mut sums = Sums::default();
     for sample in samples {
-        let mut sampler = Sampler::new(stream, sample);
+        let mut sampler = Sampler::new(of.stream, sample);
         let offset = sampler.next_2d();
         let (mut surface, mut wo) = (centre, -to_centre);
         if params.spread {
-            let d = direction(map, texel, offset);
-            let seen = world.intersect(&Ray::new(position, d));
+            let d = direction(&probe.map, of.texel, offset);
+            let seen = world.intersect(&Ray::new(probe.position, d));
             if let Some(s) = seen.filter(|s| s.object == centre.object && is_glossy(world, s, -d)) {
                 (surface, wo) = (s, -d);
             }
@@ -213,5 +297,5 @@ fn glossy_texel(bake: &Bake, position: Vec3, map: &ParameterMap, texel: u32, str
         let y = f64::from(luminance(color));
         sums = sums.and(Sums { paths: 1, color, moments: [y, y * y] });
     }
-    Some(sums)
+    sums
 }

@@ -1,5 +1,6 @@
 //! Kernels against their CPU twins, on whatever adapter there is: a software one will do. Skipped, saying so, where there is none.
 
+mod bakes;
 mod filter;
 mod paths;
 mod rays;

@@ -2,12 +2,14 @@
 
 use crate::common::{Common, Outcome, Shard, parse_shard};
 use anyhow::bail;
+use reprobe::gpu::{GpuScene, LightPaths};
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::parts::Folder;
 use reprobe::lightmap::{AtlasParams, BakeParams, Plan, lookup};
 use reprobe::transport::World;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Bake the diffuse light map
@@ -62,27 +64,36 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let [first_store, store] = [".first.parts", ".parts"].map(|ending| Folder::new(&beside(&args.output, ending), &key));
 
     let planned = began.elapsed().as_secs_f64() - loaded;
+    let scene = common.on_gpu(|gpu| GpuScene::new(gpu, &world))?;
+    let on_gpu = |scene: GpuScene| LightPaths::new(Arc::new(scene), &params.path);
     let first = match plan.first_pass() {
         // Every shard needs all of it.
         Some(pass) => {
-            plan.run(&pass, &first_store, &|_| true, &common.progress())?;
+            let gpu = scene.clone().map(on_gpu).transpose()?;
+            plan.run(&pass.on_gpu(gpu.as_ref()), &first_store, &|_| true, &common.progress())?;
             Some(plan.map(&first_store)?)
         }
         None => None,
     };
     let mine = |b: u32| args.shard.is_none_or(|s| s.has(b));
-    let kept = plan.run(&plan.second_pass(first.as_ref()), &store, &mine, &common.progress())?;
+    let scene = match (scene, &first) {
+        (Some(scene), Some(map)) => Some(scene.with_lightmap(map)?),
+        (scene, _) => scene,
+    };
+    let gpu = scene.map(on_gpu).transpose()?;
+    let kept = plan.run(&plan.second_pass(first.as_ref()).on_gpu(gpu.as_ref()), &store, &mine, &common.progress())?;
     let missing = (0..plan.blocks()).filter(|&b| !mine(b) && !plan.has(&store, b)).count();
     if missing == 0 {
         write(&plan, &world, &store, provenance, &args.output)?;
         first_store.remove()?;
     }
     let seconds = began.elapsed().as_secs_f64();
+    let device = gpu.as_ref().map_or("cpu", |g| g.device());
     let [width, height] = atlas.size;
     let state = if missing > 0 { format!("; {missing} blocks are still missing: run the other shards") } else { String::new() };
     Ok(Outcome {
         summary: format!(
-            "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples, {} of {} blocks kept from before, {seconds:.1} s{state}",
+            "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples, {} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
             args.output.display(),
             atlas.charts.len(),
             atlas.texel,
@@ -95,7 +106,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         figures: json!({
             "size": atlas.size, "charts": atlas.charts.len(), "texel": atlas.texel, "texels": plan.len(), "backs": plan.backs(),
             "spp": args.spp, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
-            "seconds_load": loaded, "seconds_plan": planned, "seconds": seconds,
+            "device": device, "seconds_load": loaded, "seconds_plan": planned, "seconds": seconds,
         }),
         ..Outcome::default()
     })

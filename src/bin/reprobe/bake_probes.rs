@@ -4,6 +4,7 @@ use crate::common::{Common, Outcome, Shard, parse_shard, parse_size};
 use crate::set_params::apply;
 use crate::views::{FrameList, parse_frames, views};
 use anyhow::{Context, bail};
+use reprobe::gpu::{GpuScene, ProbePaths};
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
@@ -19,6 +20,7 @@ use reprobe::render::glossy_probes::GlossyProbeParams;
 use reprobe::surface::curvature_file;
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Bake the glossy light probes
@@ -149,7 +151,16 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let todo: Vec<usize> = mine.filter(|&i| !finished(i)).collect();
     let baked = todo.len();
     let lightmap = args.lightmap.as_ref().map(|file| LightMap::load(file, scene)).transpose()?;
-    let shared = Bake { world: &world, params: &params, seed: common.seed, lightmap: lightmap.as_ref() };
+    let on_gpu = |gpu| {
+        let scene = GpuScene::new(gpu, &world)?;
+        let scene = match &lightmap {
+            Some(map) => scene.with_lightmap(map)?,
+            None => scene,
+        };
+        ProbePaths::new(Arc::new(scene), &params)
+    };
+    let gpu = if todo.is_empty() { None } else { common.on_gpu(on_gpu)? };
+    let shared = Bake { world: &world, params: &params, seed: common.seed, lightmap: lightmap.as_ref(), gpu: gpu.as_ref() };
     let traced = bake(args, &shared, &maps, &grid, &provenance, todo, wanted.as_ref(), &progress)?;
 
     let missing = needed.iter().filter(|&&i| !finished(i)).count();
@@ -166,17 +177,18 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         };
         write_set(&args.output, &set)?;
     }
+    let device = gpu.as_ref().map_or("cpu", |g| g.device());
     let seconds = began.elapsed().as_secs_f64();
     let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
     Ok(Outcome {
         summary: format!(
-            "{}: {baked} probes baked, {} kept, {} glossy texels at {:.0} paths, {seconds:.1} s{rest}",
+            "{}: {baked} probes baked, {} kept, {} glossy texels at {:.0} paths, {seconds:.1} s on {device}{rest}",
             args.output.display(),
             needed.len() - baked - missing,
             traced.texels,
             traced.paths as f64 / traced.texels.max(1) as f64
         ),
-        figures: json!({ "probes": needed.len(), "baked": baked, "missing": missing, "texels": traced.texels, "paths": traced.paths, "spp": args.spp, "seconds": seconds }),
+        figures: json!({ "probes": needed.len(), "baked": baked, "missing": missing, "texels": traced.texels, "paths": traced.paths, "spp": args.spp, "device": device, "seconds": seconds }),
         ..Outcome::default()
     })
 }
@@ -200,7 +212,7 @@ fn bake(
         let mut probe = probe_geometry(shared.world, grid.position(index), ParameterMap::load(&args.qhmap, index)?.0);
         let flags = wanted.as_ref().and_then(|w| w.get(&index));
         let want = |i: u32| flags.is_none_or(|f| f[i as usize]);
-        let Traced { texels, paths } = bake_glossy(shared, &mut probe, index as u32, &want, progress);
+        let Traced { texels, paths } = bake_glossy(shared, &mut probe, index as u32, &want, progress)?;
         traced.texels += texels;
         traced.paths += paths;
         let [forward, inverse] = map_paths(&args.output, index);

@@ -96,7 +96,7 @@ impl Common {
         match self.device {
             Choice::Auto | Choice::Cpu => Ok(()),
             Choice::Gpu | Choice::Named(_) => {
-                bail!("--device: resmap and the filter of render-path run on a GPU as yet; use --device cpu here")
+                bail!("--device: resmap, bake-probes, bake-lightmap, render-path and run use a GPU; use --device cpu here")
             }
         }
     }

@@ -64,7 +64,8 @@ fn main() -> ExitCode {
 }
 
 fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
-    if !matches!(command, Command::Resmap(_) | Command::RenderPath(_) | Command::Devices(_)) {
+    use Command::{BakeLightmap, BakeProbes, Devices, RenderPath, Resmap, Run};
+    if !matches!(command, Resmap(_) | BakeProbes(_) | BakeLightmap(_) | RenderPath(_) | Devices(_) | Run(_)) {
         common.refuse_gpu()?;
     }
     match command {

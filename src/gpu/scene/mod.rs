@@ -84,6 +84,7 @@ impl Tables {
 }
 
 /// A scene's triangles, materials and emitters on a device.
+#[derive(Clone)]
 pub struct GpuScene {
     pub(super) gpu: Arc<Gpu>,
     /// The bindings before `scene`, in order.

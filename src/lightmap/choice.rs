@@ -1,0 +1,173 @@
+//! One texel's value: which samples of it count (see [`super::visible`]), the light at each, and what is made of them.
+
+use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, Pass, Plan, SPLIT};
+use super::parts::Record;
+use super::visible::View;
+use crate::Result;
+use crate::gpu::{LightPaths, LightStart};
+use crate::math::{Rgb, hash_words};
+use crate::progress::Progress;
+use crate::transport::path::{KnownDiffuse, transmitted_irradiance};
+use crate::transport::{Sampler, Surface};
+use rayon::prelude::*;
+
+/// Most sample points tried for each one that counts, in a texel that is hidden in part.
+const TRIES: u32 = 4;
+
+/// Most regions of a texel that are told apart.
+const MAX_REGIONS: usize = 4;
+
+/// Paths that a GPU is given at once.
+const GPU_PATHS: usize = 1 << 21;
+
+/// The samples of a texel that count.
+struct Choice {
+    /// What they see.
+    view: View,
+    /// A point of each region that the texel falls into, above which its samples see each other.
+    regions: Vec<Surface>,
+    /// Number and region of each sample.
+    samples: Vec<(u32, u8)>,
+}
+
+/// Light of a region's samples.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    light: Rgb,
+    count: u32,
+}
+
+impl Plan<'_> {
+    /// One texel's value and flags.
+    pub(super) fn texel(&self, pass: &Pass, texel: usize, back: bool, progress: &dyn Progress) -> Record {
+        let choice = self.choose(pass, texel, back);
+        let mut sums = vec![Sum::default(); choice.regions.len()];
+        for &(i, region) in &choice.samples {
+            let (surface, sampler) = self.draw(pass, texel, back, i);
+            let sum = &mut sums[region as usize];
+            sum.light += self.light(pass, &surface, back, sampler);
+            sum.count += 1;
+        }
+        progress.advance(1);
+        self.settle(&choice, &sums, back)
+    }
+
+    /// The same for many texels, whose paths a GPU follows.
+    pub(super) fn texels_on(
+        &self,
+        gpu: &LightPaths,
+        pass: &Pass,
+        items: &[(u32, bool)],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Record>> {
+        let mut records = Vec::with_capacity(items.len());
+        for items in items.chunks((GPU_PATHS / pass.spp as usize).max(1)) {
+            let choices: Vec<Choice> = items.par_iter().map(|&(texel, back)| self.choose(pass, texel as usize, back)).collect();
+            let starts: Vec<Vec<LightStart>> = items
+                .par_iter()
+                .zip(&choices)
+                .map(|(&(texel, back), choice)| {
+                    let start = |&(sample, _): &(u32, u8)| {
+                        let (surface, _) = self.draw(pass, texel as usize, back, sample);
+                        let stream = self.stream(pass, texel as usize, back);
+                        LightStart { triangle: surface.triangle, barycentric: surface.barycentric, back, stream, sample }
+                    };
+                    choice.samples.iter().map(start).collect()
+                })
+                .collect();
+            let mut lights = gpu.light(&starts.concat())?.into_iter();
+            for (&(_, back), choice) in items.iter().zip(&choices) {
+                let mut sums = vec![Sum::default(); choice.regions.len()];
+                for (&(_, region), light) in choice.samples.iter().zip(&mut lights) {
+                    sums[region as usize].light += light;
+                    sums[region as usize].count += 1;
+                }
+                records.push(self.settle(choice, &sums, back));
+            }
+            progress.advance(items.len() as u64);
+        }
+        Ok(records)
+    }
+
+    fn stream(&self, pass: &Pass, texel: usize, back: bool) -> u32 {
+        hash_words(&[pass.seed, u32::from(back), self.texels.pixel[texel]])
+    }
+
+    /// Sample `i` of a texel: its place and the rest of its random numbers.
+    pub(super) fn draw(&self, pass: &Pass, texel: usize, back: bool, i: u32) -> (Surface, Sampler) {
+        let mut sampler = Sampler::new(self.stream(pass, texel, back), i);
+        (self.visibility().sample(texel, sampler.next_2d()), sampler)
+    }
+
+    pub(super) fn light(&self, pass: &Pass, surface: &Surface, back: bool, mut sampler: Sampler) -> Rgb {
+        let known = pass.known.map(|map| |s: &Surface, wo| map.diffuse_radiance(&self.world.scene, s, wo));
+        let known = known.as_ref().map(|known| known as KnownDiffuse);
+        // The path starts with a set of dimensions of its own, whether the view was tested or not.
+        transmitted_irradiance(self.world, surface, back, known, &self.params.path, &mut sampler)
+    }
+
+    fn choose(&self, pass: &Pass, texel: usize, back: bool) -> Choice {
+        let visibility = self.visibility();
+        let first: Vec<_> = (0..FIRST_SAMPLES).map(|i| self.draw(pass, texel, back, i)).collect();
+        let views: Vec<View> = first.iter().map(|(s, sampler)| visibility.view(s, back, &mut sampler.clone())).collect();
+        let best = views.iter().max().copied().unwrap_or(View::Inside);
+        if best == View::Inside {
+            return Choice { view: best, regions: Vec::new(), samples: Vec::new() };
+        }
+        let plain = views.iter().all(|&v| v == best)
+            && (best == View::Contact || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
+        if !plain {
+            return self.choose_in_part(pass, texel, back, best);
+        }
+        Choice { view: best, regions: vec![first[0].0], samples: (0..pass.spp).map(|i| (i, 0)).collect() }
+    }
+
+    /// The samples of a texel of which some are hidden, or lie in several regions.
+    fn choose_in_part(&self, pass: &Pass, texel: usize, back: bool, wanted: View) -> Choice {
+        let visibility = self.visibility();
+        let (mut regions, mut samples): (Vec<Surface>, _) = (Vec::new(), Vec::new());
+        for i in 0..pass.spp.saturating_mul(TRIES).max(FIRST_SAMPLES) {
+            let (surface, mut sampler) = self.draw(pass, texel, back, i);
+            if visibility.view(&surface, back, &mut sampler) != wanted {
+                continue;
+            }
+            let mut region = regions.iter().position(|at| visibility.together(at, &surface, back));
+            if region.is_none() && regions.len() < MAX_REGIONS {
+                regions.push(surface);
+                region = Some(regions.len() - 1);
+            }
+            let Some(region) = region else { continue };
+            samples.push((i, region as u8));
+            if samples.len() >= pass.spp as usize {
+                break;
+            }
+        }
+        Choice { view: wanted, regions, samples }
+    }
+
+    /// The largest region that gets any light, and of those one from which the sensor is seen in two segments, if there is one.
+    fn settle(&self, choice: &Choice, sums: &[Sum], back: bool) -> Record {
+        let flag = match choice.view {
+            View::Inside => return record(Rgb::ZERO, 0),
+            View::Contact => CONTACT,
+            View::Open => OPEN,
+        };
+        let mut lit: Vec<_> = choice.regions.iter().zip(sums).filter(|(_, sum)| sum.light != Rgb::ZERO).collect();
+        let split = if lit.len() < sums.len() && !lit.is_empty() { SPLIT } else { 0 };
+        if lit.len() > 1 {
+            let visibility = self.visibility();
+            let near: Vec<bool> = lit.iter().map(|(at, _)| visibility.near_sensor(at, back)).collect();
+            if near.contains(&true) {
+                let mut keep = near.iter();
+                lit.retain(|_| *keep.next().unwrap_or(&true));
+            }
+        }
+        // The first of equals.
+        let chosen = lit.into_iter().rev().max_by_key(|(_, sum)| sum.count);
+        record(chosen.map_or(Rgb::ZERO, |(_, sum)| sum.light / sum.count as f32), flag | split)
+    }
+}
+
+fn record(value: Rgb, flags: u32) -> Record {
+    [value.x.to_bits(), value.y.to_bits(), value.z.to_bits(), flags]
+}
