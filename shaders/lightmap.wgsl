@@ -11,7 +11,7 @@ fn lightmap_lookup(triangle: u32, barycentric: vec2<f32>, back: bool) -> vec3<f3
     let p = a + (b - a) * barycentric.x + (c - a) * barycentric.y;
     let size = vec2(scene.light_width, scene.light_height);
     let q = clamp(p - 0.5, vec2(0.0), vec2<f32>(size - 1u));
-    let low = vec2<u32>(q);
+    let low = min(vec2<u32>(q), size - 1u);
     let high = min(low + 1u, size - 1u);
     let f = q - vec2<f32>(low);
     let above = mix(light_texel(low.x, low.y, back), light_texel(high.x, low.y, back), f.x);

@@ -15,7 +15,7 @@ pub(super) struct Kernel {
 impl Kernel {
     /// Compiles `source`; the name of its entry point names the kernel.
     pub(super) fn new(gpu: &Gpu, source: &str, entry: &'static str) -> Result<Self> {
-        Ok(Self { pipeline: pipeline(gpu, source, entry, None, &[])?, scene: None })
+        Ok(Self { pipeline: pipeline(gpu, (source, checked), entry, None, &[])?, scene: None })
     }
 
     /// A kernel in a scene, of `reads` buffers to read and then `writes` to write. `source` holds the files that `entry` needs; `constants`
@@ -37,27 +37,47 @@ impl Kernel {
             })
         })?;
         let constants = [constants, &[("HAS_MASKS", f64::from(u8::from(scene.has_masks)))]].concat();
-        let pipeline = pipeline(gpu, source, entry, Some(&layout), &constants)?;
+        let compile = if cfg!(debug_assertions) { checked } else { unchecked };
+        let pipeline = pipeline(gpu, (source, compile), entry, Some(&layout), &constants)?;
         Ok(Self { pipeline, scene: Some(scene.group.clone()) })
     }
 }
 
+type Compile = fn(&Gpu, &str, &'static str) -> wgpu::ShaderModule;
+
+/// A module that tests every index and bounds every loop.
+fn checked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule {
+    let source = wgpu::ShaderSource::Wgsl(source.into());
+    gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(entry), source })
+}
+
+/// A module that does neither: some per cent of a path's time. For kernels in a scene, which read what [`GpuScene`] has written.
+fn unchecked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule {
+    let source = wgpu::ShaderSource::Wgsl(source.into());
+    let descriptor = wgpu::ShaderModuleDescriptor { label: Some(entry), source };
+    // SAFETY: every index is one of three kinds. Invocations past a list's end return first. Numbers of nodes, triangles, materials, models,
+    // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there; those of triangles
+    // at which paths start come from hits of the same scene. Pixels, texels and table entries that are computed from coordinates are wrapped
+    // or clamped to their image or table, after the coordinates were tested for numbers. The traversal's stack is no deeper than `STACK`,
+    // which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the root down or up, or end with a path's depth, which
+    // the roulette bounds. Builds with debug assertions, so all tests, run the same kernels checked.
+    unsafe { gpu.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
+}
+
 fn pipeline(
     gpu: &Gpu,
-    source: &str,
+    (source, compile): (&str, Compile),
     entry: &'static str,
     layout: Option<&wgpu::PipelineLayout>,
     constants: &[(&str, f64)],
 ) -> Result<wgpu::ComputePipeline> {
-    let label = Some(entry);
     gpu.checked(|| {
-        let source = wgpu::ShaderSource::Wgsl(source.into());
-        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
+        let module = compile(gpu, source, entry);
         gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label,
+            label: Some(entry),
             layout,
             module: &module,
-            entry_point: label,
+            entry_point: Some(entry),
             compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
             cache: None,
         })
