@@ -7,9 +7,11 @@ use reprobe::probe::file::Probe;
 use reprobe::probe::qhmap::ParameterMap;
 use reprobe::progress::Silent;
 use reprobe::render::candidates::Candidates;
+use reprobe::render::composite::downsample;
+use reprobe::render::coverage::{CoverageParams, SubPixels, covered_pixels};
 use reprobe::render::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
 use reprobe::render::gbuffer::{GBuffer, gbuffer};
-use reprobe::render::mirror::{Reflected, mirror_hit};
+use reprobe::render::mirror::{Reflected, mirror_hit, mirror_pass};
 use reprobe::render::perturb::Order;
 use reprobe::scene::load::{LoadOptions, load};
 use reprobe::scene::{Camera, Scene};
@@ -87,6 +89,12 @@ impl Setup {
         gather(&self.world, view, reflected, &weighted, 0.5, params)
     }
 
+    /// Radiance of the emitter of this material; black for others.
+    fn emission(&self, material: u16) -> Vec3 {
+        let object = self.world.scene.geometry.objects.iter().find(|o| o.material == u32::from(material) && o.emitter.is_some());
+        object.map_or(Vec3::ZERO, |_| self.expected(&Reflected { point: Vec3::ZERO, material }))
+    }
+
     /// What a mirror pixel should show: the radiance of the wall that its mirror ray meets.
     fn expected(&self, reflected: &Reflected) -> Vec3 {
         let m = &self.world.scene.materials;
@@ -160,6 +168,49 @@ fn the_paraboloid_serves_a_mirror_sphere_better_than_its_tangent_planes() {
     };
     let (second, flat) = (mean_energy(Order::Second), mean_energy(Order::Plane));
     assert!(second < 0.6 * flat, "paraboloid {second}, plane {flat}");
+}
+
+#[test]
+fn coverage_antialiases_edges_and_what_mirrors_show_of_them() {
+    let scene = room(&format!(
+        r#"<shape type="sphere"><point name="center" x="-0.6" y="0" z="0.6"/><float name="radius" value="0.4"/>{MIRROR}</shape>
+           <shape type="rectangle"><transform name="to_world"><scale value="0.6"/><translate value="0.4,0,0.1"/></transform>{MIRROR}</shape>"#
+    ));
+    let setup = Setup::new(scene, Vec3::new(0.2, 0.1, 2.0), 0.6, 16);
+    let camera = Camera::look_at(Vec3::new(0.3, 0.05, 2.1), Vec3::ZERO, Vec3::new(0.2, 1.0, 0.0), 1.0, [64, 48]);
+    // What ideal passes would find at each of n x n rays a pixel.
+    let ideal = |n: u32| {
+        let fine = Camera { size: camera.size.map(|s| s * n), ..camera.clone() };
+        let view = gbuffer(&setup.world, &setup.curvature, &fine);
+        let reflected = mirror_pass(&setup.world, &view);
+        let shown = |r: &Reflected| if *r == Reflected::NONE || r.is_sky() { Vec3::ZERO } else { setup.emission(r.material) };
+        let glossy: Vec<Vec3> = reflected.iter().map(shown).collect();
+        let emission: Vec<Vec3> = view.pixels.iter().map(|p| p.as_ref().map_or(Vec3::ZERO, |p| p.emission)).collect();
+        (view, reflected, glossy, emission)
+    };
+    let down = |layer: &[Vec3], n: u32| downsample(layer, camera.size.map(|s| (s * n) as usize), n as usize);
+    let (.., glossy, emission) = ideal(12);
+    let truth = [down(&glossy, 12), down(&emission, 12)];
+    let rmse = |a: &[Vec3], b: &[Vec3]| {
+        let sum: f32 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
+        (sum / a.len() as f32).sqrt()
+    };
+    for n in [1, 2] {
+        let (view, reflected, glossy, emission) = ideal(n);
+        let plain = [down(&glossy, n), down(&emission, n)];
+        let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
+        let mut better = plain.clone();
+        let covered = covered_pixels(&setup.world, &setup.curvature, None, &camera, &sub, &CoverageParams::default());
+        assert!(covered.len() * 2 < better[0].len(), "{} of {} pixels count as edges", covered.len(), better[0].len());
+        for (i, pixel) in covered {
+            (better[0][i], better[1][i]) = (pixel.glossy, pixel.emission);
+        }
+        for (layer, name) in ["glossy", "emission"].into_iter().enumerate() {
+            let (before, after) = (rmse(&plain[layer], &truth[layer]), rmse(&better[layer], &truth[layer]));
+            assert!(after < 0.6 * before, "{name}, {n} x {n}: {before} before, {after} after");
+        }
+        assert!(covered_pixels(&setup.world, &setup.curvature, None, &camera, &sub, &CoverageParams { rays: 0 }).is_empty());
+    }
 }
 
 #[test]

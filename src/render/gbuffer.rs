@@ -64,7 +64,8 @@ pub fn gbuffer(world: &World, curvature: &CurvatureMap, camera: &Camera) -> GBuf
     GBuffer { camera: camera.clone(), pixels, background }
 }
 
-fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) -> Pixel {
+/// What is known of a pixel that sees `surface` from `wo`.
+pub fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) -> Pixel {
     let bsdf = &world.scene.materials[surface.material as usize].bsdf;
     let normal = facing_normal(&surface, wo);
     let has_glossy = bsdf.lobes().contains(Lobes::NON_DIFFUSE) && (bsdf.is_two_sided() || surface.frame.n.dot(wo) > 0.0);

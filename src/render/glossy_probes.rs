@@ -2,6 +2,7 @@
 
 use super::candidates::NearCandidates;
 use super::composite::{Previous, diffuse_layer, downsample, reproject_previous};
+use super::coverage::{CoverageParams, SubPixels, covered_pixels};
 use super::filter::{FilterInput, FilterParams, NOT_GLOSSY, filter};
 use super::footprint::{Footprint, FootprintParams, GlossyPoint};
 use super::gather::{GatherParams, Gathered, gather};
@@ -34,6 +35,8 @@ pub struct GlossyProbeParams {
     pub footprint: Option<FootprintParams>,
     /// §6.2, §6.3.
     pub filter: FilterParams,
+    /// Rays along edges.
+    pub coverage: CoverageParams,
 }
 
 impl Default for GlossyProbeParams {
@@ -43,6 +46,7 @@ impl Default for GlossyProbeParams {
             gather: GatherParams::default(),
             footprint: Some(FootprintParams::default()),
             filter: FilterParams::default(),
+            coverage: CoverageParams::default(),
         }
     }
 }
@@ -55,6 +59,7 @@ impl GlossyProbeParams {
             gather: GatherParams::paper(),
             footprint: Some(FootprintParams::paper()),
             filter: FilterParams::paper(),
+            coverage: CoverageParams { rays: 0 },
         }
     }
 }
@@ -162,7 +167,7 @@ impl<'a> Renderer<'a> {
         };
         let emission: Vec<Rgb> =
             view.pixels.par_iter().zip(&view.background).map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission)).collect();
-        let frame = Frame {
+        let mut frame = Frame {
             emission: downsample(&emission, size, n as usize),
             diffuse: downsample(&diffuse, size, n as usize),
             glossy: downsample(&glossy, size, n as usize),
@@ -170,8 +175,13 @@ impl<'a> Renderer<'a> {
             unserved,
             buffers: Buffers { view: view.clone(), reflected, gathered, covariance },
         };
-        self.previous = Some(Previous { view, glossy });
         clock.lap("composite");
+        let sub = SubPixels { view: &view, reflected: &frame.buffers.reflected, glossy: &glossy, n: n as usize };
+        for (i, covered) in covered_pixels(self.world, self.curvature, self.lightmap, camera, &sub, &self.params.coverage) {
+            (frame.emission[i], frame.diffuse[i], frame.glossy[i]) = (covered.emission, covered.diffuse, covered.glossy);
+        }
+        clock.lap("coverage");
+        self.previous = Some(Previous { view, glossy });
         Ok(Frame { passes: clock.laps, ..frame })
     }
 }

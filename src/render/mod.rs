@@ -4,6 +4,7 @@
 pub mod aov;
 pub mod candidates;
 pub mod composite;
+pub mod coverage;
 pub mod filter;
 pub mod footprint;
 pub mod gather;
