@@ -61,7 +61,7 @@ fn sigma(alpha: f32, d_c: f32, d_r: f32) -> f32 {
 
 // How far a step v at a point moves in the image, pixels; `at` is the point, both in the camera's axes.
 fn pixels_of(at: vec3<f32>, v: vec3<f32>) -> vec2<f32> {
-    return (at.xy * v.z / at.z - v.xy) * (params.camera.focal / at.z);
+    return (at.xy * v.z / at.z - v.xy) * (params.camera.focal_px / at.z);
 }
 
 // Image of a unit tilt of the half vector along each principal direction, pixels.
@@ -102,11 +102,11 @@ fn covariance(x: vec3<f32>, n: vec3<f32>, d_r: f32, alpha: f32, curvature: Curva
     if !(variance > 0.0 && is_finite(variance)) {
         return vec3(0.0);
     }
-    var columns = mat2x2(camera.focal, 0.0, 0.0, camera.focal);
+    var columns = mat2x2(camera.focal_px, 0.0, 0.0, camera.focal_px);
     if params.foreshortening == FORESHORTENING_PAPER {
         let facing = clamp(dot(to_eye, n) / d_c, 0.0, 1.0);
         let along = -normalize_or(vec3(camera_local(camera, n).xy, 0.0), vec3(-1.0, 0.0, 0.0)).xy;
-        columns = mat2x2(along * (camera.focal * sqrt(facing)), vec2(-along.y, along.x) * camera.focal);
+        columns = mat2x2(along * (camera.focal_px * sqrt(facing)), vec2(-along.y, along.x) * camera.focal_px);
     } else if params.foreshortening != FORESHORTENING_NONE {
         // Undo the table's geometry at the distances it was read at.
         let unit = 0.5 * (1.0 + clamp(d_c, DISTANCES.x, DISTANCES.y) / clamp(d_r, DISTANCES.x, DISTANCES.y));

@@ -95,8 +95,7 @@ impl Gpu {
     pub(super) fn output(&self, label: &'static str, size: u64) -> Result<wgpu::Buffer> {
         self.fits(label, size)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        // A binding may not be smaller than one element.
-        let (label, size, mapped_at_creation) = (Some(label), size.max(64), false);
+        let (label, mapped_at_creation) = (Some(label), false);
         self.checked(|| self.device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation }))
     }
 

@@ -409,7 +409,7 @@ fn albedo_ratio(view: Rgb, w: &WeightedProbe, at: Vec2) -> Rgb {
 }
 
 /// Directional albedo of the non-diffuse lobe in the view.
-pub(crate) fn view_albedo(world: &World, pixel: &Pixel, roughness_scale: f32) -> Rgb {
+fn view_albedo(world: &World, pixel: &Pixel, roughness_scale: f32) -> Rgb {
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
     let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
     bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query)

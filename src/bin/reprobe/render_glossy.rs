@@ -88,7 +88,6 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
                 renderer.inspect = inspect;
                 timings.device = Some(renderer.device().to_owned());
                 timings.clock = if renderer.has_clock() { "gpu" } else { "cpu" };
-                timings.on_cpu = gpu::Renderer::ON_CPU.to_vec();
                 Engine::Gpu(Box::new(renderer))
             }
             None => {
@@ -100,11 +99,11 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     }
     let bar = common.progress();
     bar.start("glossy-probes", frames.len() as u64);
-    for (camera, (path, provenance)) in cameras.iter().zip(frames) {
+    for (i, (camera, (path, provenance))) in cameras.iter().zip(frames).enumerate() {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut times = FrameTimings { name, kept, ..FrameTimings::default() };
         if let Some(engine) = &mut engine {
-            let frame = engine.frame(camera, &mut probes)?;
+            let frame = engine.frame(camera, cameras.get(i + 1), &mut probes)?;
             for &(pass, ms) in &frame.passes {
                 times.passes_ms.insert(pass.into(), ms);
             }
@@ -143,10 +142,10 @@ enum Engine<'a> {
 }
 
 impl Engine<'_> {
-    fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore) -> reprobe::Result<Frame> {
+    fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> reprobe::Result<Frame> {
         match self {
             Self::Cpu(renderer) => renderer.frame(camera, probes),
-            Self::Gpu(renderer) => renderer.frame(camera, probes),
+            Self::Gpu(renderer) => renderer.frame(camera, next, probes),
         }
     }
 

@@ -15,8 +15,6 @@ pub struct Timings {
     pub device: Option<String>,
     /// Whose clock the passes on the GPU were timed by: "gpu", or "cpu" for the host's, which includes handing them over.
     pub clock: &'static str,
-    /// With a GPU: passes that ran on the CPU all the same.
-    pub on_cpu: Vec<&'static str>,
     /// Scene loading, milliseconds.
     pub load_ms: f64,
     /// Acceleration structures, milliseconds.

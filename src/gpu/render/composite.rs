@@ -8,12 +8,10 @@ use super::gather::Sums;
 use super::view::{Guides, View};
 use super::{WORKGROUP, groups};
 use crate::Result;
-use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::scene;
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec2, Vec4, Vec4Swizzles};
-use half::f16;
+use glam::{Vec4, Vec4Swizzles};
 
 /// What the shader's `Params` holds.
 #[repr(C)]
@@ -24,32 +22,6 @@ struct Params {
     height: u32,
     has_previous: u32,
     supersample: u32,
-    lightmap: [u32; 2],
-    has_back: u32,
-    padding: u32,
-}
-
-/// A light map on the device.
-struct GpuLightMap {
-    size: [u32; 2],
-    has_back: bool,
-    irradiance: wgpu::Buffer,
-    corners: wgpu::Buffer,
-}
-
-impl GpuLightMap {
-    fn new(gpu: &Gpu, map: Option<&LightMap>) -> Result<Self> {
-        let texel = |c: &Rgb| [c.x, c.y, c.z, 0.0].map(f16::from_f32);
-        let sides = map.into_iter().flat_map(|m| m.front.iter().chain(m.back.iter().flatten()));
-        let texels: Vec<[f16; 4]> = sides.map(texel).collect();
-        let corners: &[[Vec2; 3]] = map.map_or(&[], |m| &m.corners);
-        Ok(Self {
-            size: map.map_or([0, 0], |m| m.size),
-            has_back: map.is_some_and(|m| m.back.is_some()),
-            irradiance: gpu.upload("the light map", bytemuck::cast_slice(&texels))?,
-            corners: gpu.upload("the light map's corners", bytemuck::cast_slice(corners))?,
-        })
-    }
 }
 
 /// A frame's layers on the device.
@@ -78,28 +50,17 @@ impl Layers {
     }
 }
 
-/// The kernels with the light map.
+/// The kernels.
 pub(super) struct Composite {
     fill: Kernel,
     layers: Kernel,
-    lightmap: GpuLightMap,
     supersample: u32,
 }
 
 impl Composite {
-    pub(super) fn new(gpu: &Gpu, lightmap: Option<&LightMap>, supersample: u32) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, supersample: u32) -> Result<Self> {
         let source = shader!("math", "camera", "perturb", "view", "composite");
-        Ok(Self {
-            fill: Kernel::new(gpu, source, "fill")?,
-            layers: Kernel::new(gpu, source, "layers")?,
-            lightmap: GpuLightMap::new(gpu, lightmap)?,
-            supersample,
-        })
-    }
-
-    /// Bytes of the light map.
-    pub(super) fn bytes(&self) -> u64 {
-        self.lightmap.irradiance.size() + self.lightmap.corners.size()
+        Ok(Self { fill: Kernel::new(gpu, source, "fill")?, layers: Kernel::new(gpu, source, "layers")?, supersample })
     }
 
     fn params(&self, gpu: &Gpu, size: [u32; 2], camera: &scene::Camera, has_previous: bool) -> Result<wgpu::Buffer> {
@@ -109,9 +70,6 @@ impl Composite {
             height: size[1],
             has_previous: has_previous.into(),
             supersample: self.supersample,
-            lightmap: self.lightmap.size,
-            has_back: self.lightmap.has_back.into(),
-            padding: 0,
         };
         gpu.upload("the composite's parameters", bytemuck::bytes_of(&params))
     }
@@ -156,18 +114,7 @@ impl Composite {
     ) -> Result<()> {
         let params = self.params(gpu, view.size, camera, false)?;
         let [emission, diffuse, out] = &layers.planes;
-        let buffers = [
-            &params,
-            glossy,
-            &view.emission,
-            &view.diffuse,
-            &view.hits,
-            &self.lightmap.irradiance,
-            &self.lightmap.corners,
-            emission,
-            diffuse,
-            out,
-        ];
+        let buffers = [&params, &view.emission, &view.diffuse, glossy, emission, diffuse, out];
         commands.run("composite", &self.layers, &buffers, groups(view.size.map(|n| n / self.supersample), WORKGROUP));
         Ok(())
     }
@@ -181,6 +128,6 @@ mod tests {
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
         let source = shader!("math", "camera", "perturb", "view", "composite");
-        check!(source, Params as "Params" { previous, width, height, has_previous, supersample, lightmap, has_back });
+        check!(source, Params as "Params" { previous, width, height, has_previous, supersample });
     }
 }

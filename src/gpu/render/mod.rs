@@ -6,6 +6,7 @@ mod composite;
 mod filter;
 mod footprint;
 mod gather;
+mod gbuffer;
 mod probes;
 mod view;
 
@@ -13,14 +14,14 @@ pub use filter::Filter;
 
 use super::Gpu;
 use super::commands::Commands;
+use super::scene::GpuScene;
 use crate::lightmap::LightMap;
+use crate::probe::file::Probe;
 use crate::probe::store::ProbeStore;
 use crate::render::candidates::Candidates;
 use crate::render::footprint::FootprintParams;
 use crate::render::gather::Gathered;
-use crate::render::gbuffer::gbuffer;
 use crate::render::glossy_probes::{Buffers, Clock, Frame, GlossyProbeParams, nearest_probes};
-use crate::render::mirror::mirror_pass;
 use crate::scene::Camera;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
@@ -29,6 +30,7 @@ use composite::{Composite, Layers};
 use filter::{Planes, Scratch};
 use footprint::Footprint;
 use gather::{Gather, Sums};
+use gbuffer::GBuffer;
 use glam::{Vec2, Vec4, Vec4Swizzles};
 use probes::{Place, Resident};
 use std::sync::Arc;
@@ -85,11 +87,12 @@ pub struct Renderer<'a> {
     /// Whether frames come with their [`Buffers`].
     pub inspect: bool,
     gpu: Arc<Gpu>,
+    scene: GpuScene,
     world: &'a World,
-    curvature: &'a CurvatureMap,
     params: GlossyProbeParams,
     roughness_scale: f32,
     memory: u64,
+    gbuffer: GBuffer,
     gather: Gather,
     footprint: Option<Footprint>,
     filter: Filter,
@@ -99,14 +102,11 @@ pub struct Renderer<'a> {
 }
 
 impl<'a> Renderer<'a> {
-    /// Passes that still run on the CPU.
-    pub const ON_CPU: [&'static str; 3] = ["load", "gbuffer", "mirror"];
-
     /// Compiles the passes; as [`crate::render::glossy_probes::Renderer::new`]. `memory` is what all of it may take on the device, bytes.
     pub fn new(
         gpu: Arc<Gpu>,
         world: &'a World,
-        curvature: &'a CurvatureMap,
+        curvature: &CurvatureMap,
         lightmap: Option<&LightMap>,
         params: GlossyProbeParams,
         roughness_scale: f32,
@@ -116,16 +116,19 @@ impl<'a> Renderer<'a> {
             let table = crate::render::footprint::Footprint::new(&FootprintParams { roughness_scale, ..f });
             Footprint::new(&gpu, &table)
         });
+        let scene = GpuScene::new(gpu.clone(), world)?;
+        let scene = if let Some(map) = lightmap { scene.with_lightmap(map)? } else { scene };
         Ok(Self {
             inspect: false,
             world,
-            curvature,
             roughness_scale,
             memory,
+            gbuffer: GBuffer::new(&scene, world, curvature)?,
+            scene,
             gather: Gather::new(&gpu, &params.gather)?,
             footprint: footprint.transpose()?,
             filter: Filter::new(gpu.clone(), &params.filter)?,
-            composite: Composite::new(&gpu, lightmap, params.supersample)?,
+            composite: Composite::new(&gpu, params.supersample)?,
             resident: Resident::new(0),
             target: None,
             params,
@@ -157,7 +160,7 @@ impl<'a> Renderer<'a> {
         }
         self.target = None;
         let area = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
-        let frame = area(fine) * Target::BYTES + area(size) * Layers::BYTES + self.composite.bytes();
+        let frame = area(fine) * Target::BYTES + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
         let probe = area(probe) * probes::TEXEL;
         if frame + probe > self.memory {
             let mib = |bytes: u64| bytes.div_ceil(1 << 20);
@@ -175,14 +178,14 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    /// Renders the next frame of a path.
-    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+    /// Renders the next frame of a path; meanwhile probes are uploaded for the one after it, where there is `next`.
+    pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
         self.reserve(camera.size, probes.set.size)?;
         let gpu = self.gpu.clone();
-        gpu.checked(|| self.passes(camera, probes))?
+        gpu.checked(|| self.passes(camera, next, probes))?
     }
 
-    fn passes(&mut self, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+    fn passes(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
         let Some(t) = &mut self.target else { unreachable!("reserved") };
         let (gpu, params, eye) = (&*self.gpu, &self.params, camera.position());
         let fine = Camera { size: t.view.size, ..camera.clone() };
@@ -190,20 +193,17 @@ impl<'a> Renderer<'a> {
         let mut clock = Clock::start();
         let mut commands = Commands::new(gpu);
 
-        let view = gbuffer(self.world, self.curvature, &fine);
-        clock.lap("gbuffer");
-        let reflected = mirror_pass(self.world, &view);
-        clock.lap("mirror");
-        t.view.upload(gpu, self.world, &view, &reflected, albedos);
-        clock.lap("upload");
-
+        self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, albedos)?;
         gpu.clear(&t.sums.sums);
+        self.resident.begin_frame();
+        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos);
         for (index, weight) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
+            clock.restart();
             let probe = probes.probe(index)?;
-            let there = self.resident.get(gpu, index, &probe, || Candidates::new(self.world, &probe, albedos))?;
+            let there = self.resident.get(gpu, index, &probe, || candidates(&probe))?;
+            clock.lap("load");
             self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &Place::new(index, &probe, weight)), &t.sums)?;
         }
-        clock.lap("load");
         let previous = (t.last_camera.as_ref(), &t.last, &t.glossy);
         self.composite.fill(gpu, &mut commands, (&t.view, &fine, &t.gathered), &t.sums, previous, &t.layers)?;
         match &self.footprint {
@@ -221,6 +221,14 @@ impl<'a> Renderer<'a> {
         };
         self.filter.run(&mut commands, &planes)?;
         self.composite.layers(gpu, &mut commands, (view, &fine), &t.glossy, &t.layers)?;
+        clock.restart();
+        for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
+            // What fails here fails again when that frame is rendered.
+            if let Ok(probe) = probes.probe(index) {
+                self.resident.upload_ahead(gpu, index, &probe, || candidates(&probe))?;
+            }
+        }
+        clock.lap("load");
         let passes = commands.finish()?;
 
         clock.restart();

@@ -66,11 +66,13 @@ pub(super) struct Resident {
     /// Bytes that they may take.
     budget: u64,
     clock: u64,
+    /// When the frame began.
+    frame: u64,
 }
 
 impl Resident {
     pub(super) fn new(budget: u64) -> Self {
-        Self { probes: BTreeMap::new(), budget, clock: 0 }
+        Self { probes: BTreeMap::new(), budget, clock: 0, frame: 0 }
     }
 
     /// Changes how much the probes may take.
@@ -81,6 +83,11 @@ impl Resident {
     /// Bytes that the probes take.
     pub(super) fn bytes(&self) -> u64 {
         self.probes.values().map(|(_, p)| p.bytes).sum()
+    }
+
+    /// Begins a frame.
+    pub(super) fn begin_frame(&mut self) {
+        self.frame = self.clock;
     }
 
     /// A probe; uploaded where it is not there, in place of those used longest ago. One that is larger than the whole budget is alone.
@@ -96,11 +103,32 @@ impl Resident {
             *used = self.clock;
             return Ok(there.clone());
         }
-        let needed = bytes(probe);
+        self.make_room(gpu, bytes(probe), u64::MAX);
+        let there = Rc::new(GpuProbe::upload(gpu, probe, &candidates())?);
+        self.probes.insert(index, (self.clock, there.clone()));
+        Ok(there)
+    }
+
+    /// Uploads a probe that a later frame needs, unless a probe of this one would have to go.
+    pub(super) fn upload_ahead(
+        &mut self,
+        gpu: &Gpu,
+        index: usize,
+        probe: &Probe,
+        candidates: impl FnOnce() -> Candidates,
+    ) -> Result<()> {
+        if !self.probes.contains_key(&index) && self.make_room(gpu, bytes(probe), self.frame + 1) {
+            self.get(gpu, index, probe, candidates)?;
+        }
+        Ok(())
+    }
+
+    /// Drops the probes used longest ago, but none used at `time` or later, until there is room; false where there is not enough.
+    fn make_room(&mut self, gpu: &Gpu, needed: u64, time: u64) -> bool {
         let mut dropped = false;
-        while self.bytes() + needed > self.budget
-            && let Some(oldest) = self.probes.iter().min_by_key(|(_, (used, _))| *used).map(|(i, _)| *i)
-        {
+        while self.bytes() + needed > self.budget {
+            let old = self.probes.iter().filter(|(_, (used, _))| *used < time);
+            let Some(oldest) = old.min_by_key(|(_, (used, _))| *used).map(|(i, _)| *i) else { break };
             self.probes.remove(&oldest);
             dropped = true;
         }
@@ -108,9 +136,7 @@ impl Resident {
             // The device gives memory back once nothing that it was asked for needs it.
             gpu.wait();
         }
-        let there = Rc::new(GpuProbe::upload(gpu, probe, &candidates())?);
-        self.probes.insert(index, (self.clock, there.clone()));
-        Ok(there)
+        self.bytes() + needed <= self.budget
     }
 }
 

@@ -1,33 +1,24 @@
-//! A view on the device, a pixel an entry in each of its planes: the twin of [`GBuffer`] and of the mirror pass's [`Reflected`].
+//! A view on the device, a pixel an entry in each of its planes: the twin of [`crate::render::gbuffer::GBuffer`] and of [`Reflected`].
 
 use super::super::Gpu;
 use crate::Result;
-use crate::math::{Frame, Rgb};
-use crate::render::filter::NOT_GLOSSY;
-use crate::render::gather::view_albedo;
-use crate::render::gbuffer::{GBuffer, Pixel};
 use crate::render::mirror::Reflected;
-use crate::transport::World;
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec3, Vec4};
-use rayon::prelude::*;
-
-/// In a plane of hits: the environment is seen.
-const NO_TRIANGLE: u32 = u32::MAX;
+use glam::Vec3;
 
 /// A reflected hit as shaders have it.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct GpuReflected {
-    pub(super) point: [f32; 3],
-    pub(super) material: u32,
+struct GpuReflected {
+    point: [f32; 3],
+    material: u32,
 }
 
 /// What the frame after this one looks at, too.
 pub(super) struct Guides {
     /// Shading normal on the camera's side, and distance to the camera.
     pub(super) normals: wgpu::Buffer,
-    /// Materials, [`NOT_GLOSSY`] where no probe is asked.
+    /// Materials; [`crate::render::filter::NOT_GLOSSY`] where no probe is asked.
     pub(super) materials: wgpu::Buffer,
 }
 
@@ -43,17 +34,17 @@ pub(super) struct View {
     pub(super) size: [u32; 2],
     /// What the later passes look at most.
     pub(super) guides: Guides,
-    /// Distance (as bits), triangle and barycentrics (as bits) of the surface seen.
+    /// What the camera's rays meet.
     pub(super) hits: wgpu::Buffer,
     /// The surface seen, and alpha.
     pub(super) positions: wgpu::Buffer,
-    /// Principal curvatures, and the first one's direction in the tangents of [`Frame::from_normal`].
+    /// Principal curvatures, and the first one's direction in the tangents of [`crate::math::Frame::from_normal`].
     pub(super) curvatures: wgpu::Buffer,
     /// Mirror hits.
     pub(super) reflected: wgpu::Buffer,
     /// Radiance emitted towards the camera; the environment's where nothing is seen.
     pub(super) emission: wgpu::Buffer,
-    /// The view's factor of the diffuse lobe; then 1 where the camera sees the shading normal's back.
+    /// Radiance of the diffuse lobe, by the light map.
     pub(super) diffuse: wgpu::Buffer,
     /// Directional albedo of the glossy lobe at the probes' roughness.
     pub(super) albedos: wgpu::Buffer,
@@ -79,37 +70,6 @@ impl View {
         })
     }
 
-    /// Fills the planes from the CPU's passes; glossy albedos where the probes' `roughness_scale` is given.
-    pub(super) fn upload(&self, gpu: &Gpu, world: &World, view: &GBuffer, reflected: &[Reflected], roughness_scale: Option<f32>) {
-        plane(gpu, &self.hits, view, [0, NO_TRIANGLE, 0, 0], |p| {
-            let s = &p.surface;
-            [s.t.to_bits(), s.triangle, s.barycentric.x.to_bits(), s.barycentric.y.to_bits()]
-        });
-        plane(gpu, &self.guides.normals, view, Vec4::ZERO, |p| p.normal.extend(p.depth));
-        let material = |p: &Pixel| if p.alpha.is_some() { p.surface.material } else { NOT_GLOSSY };
-        plane(gpu, &self.guides.materials, view, NOT_GLOSSY, material);
-        plane(gpu, &self.positions, view, Vec4::ZERO, |p| p.surface.p.extend(p.alpha.unwrap_or(-1.0)));
-        plane(gpu, &self.curvatures, view, Vec4::ZERO, |p| {
-            let (frame, c) = (Frame::from_normal(p.normal), &p.curvature);
-            Vec4::new(c.k1, c.k2, c.d1.dot(frame.s), c.d1.dot(frame.t))
-        });
-        plane(gpu, &self.diffuse, view, Vec4::ZERO, |p| {
-            let wi = p.surface.frame.to_local(p.wo);
-            let out = world.scene.materials[p.surface.material as usize].bsdf.diffuse_out(&p.surface, wi);
-            out.extend(if wi.z < 0.0 { 1.0 } else { 0.0 })
-        });
-        plane(gpu, &self.albedos, view, Vec4::ZERO, |p| {
-            let glossy = roughness_scale.filter(|_| p.alpha.is_some());
-            glossy.map_or(Rgb::ZERO, |scale| view_albedo(world, p, scale)).extend(0.0)
-        });
-        let emission = view.pixels.par_iter().zip(&view.background);
-        let emission: Vec<Vec4> = emission.map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission).extend(0.0)).collect();
-        gpu.queue.write_buffer(&self.emission, 0, bytemuck::cast_slice(&emission));
-        let reflected = reflected.par_iter();
-        let reflected: Vec<_> = reflected.map(|r| GpuReflected { point: r.point.into(), material: r.material.into() }).collect();
-        gpu.queue.write_buffer(&self.reflected, 0, bytemuck::cast_slice(&reflected));
-    }
-
     /// The mirror hits.
     pub(super) fn read_reflected(&self, gpu: &Gpu) -> Result<Vec<Reflected>> {
         let read: Vec<GpuReflected> = gpu.read(&self.reflected)?;
@@ -117,8 +77,14 @@ impl View {
     }
 }
 
-/// Writes a plane; `nothing` where the environment is seen.
-fn plane<T: Pod + Send + Sync>(gpu: &Gpu, plane: &wgpu::Buffer, view: &GBuffer, nothing: T, of: impl Fn(&Pixel) -> T + Sync) {
-    let values: Vec<T> = view.pixels.par_iter().map(|p| p.as_ref().map_or(nothing, &of)).collect();
-    gpu.queue.write_buffer(plane, 0, bytemuck::cast_slice(&values));
+#[cfg(test)]
+mod tests {
+    use super::super::super::kernel::shader;
+    use super::super::super::layout::check;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(shader!("math", "view"), GpuReflected as "Reflected" { point, material });
+    }
 }
