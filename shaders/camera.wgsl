@@ -13,14 +13,14 @@ struct Camera {
     height: u32,
 }
 
-fn camera_ray(camera: Camera, pixel: vec2<f32>, lens: vec2<f32>) -> Ray {
-    let half_size = vec2(f32(camera.width), f32(camera.height)) * 0.5;
-    let d = vec3(half_size - pixel, camera.focal_px);
-    if camera.aperture_radius == 0.0 {
-        return Ray(camera.position, 0.0, normalize(camera.x * d.x + camera.y * d.y + camera.z * d.z), FAR);
-    }
-    let o = vec3(disk(lens) * camera.aperture_radius, 0.0);
-    let t = d * (camera.focus_distance / d.z) - o;
-    let origin = camera.position + camera.x * o.x + camera.y * o.y;
-    return Ray(origin, 0.0, normalize(camera.x * t.x + camera.y * t.y + camera.z * t.z), FAR);
+// World to camera, for directions.
+fn camera_local(camera: Camera, v: vec3<f32>) -> vec3<f32> {
+    return vec3(dot(camera.x, v), dot(camera.y, v), dot(camera.z, v));
+}
+
+// The pixel that the camera sees p at in x and y; z is negative behind the camera.
+fn project(camera: Camera, p: vec3<f32>) -> vec3<f32> {
+    let local = camera_local(camera, p - camera.position);
+    let half_size = 0.5 * vec2(f32(camera.width), f32(camera.height));
+    return vec3(half_size - local.xy * (camera.focal_px / max(local.z, 1e-30)), select(-1.0, 1.0, local.z > 0.0));
 }

@@ -1,5 +1,9 @@
-// One pass of the glossy filter (§6.3): each pixel's value becomes the mean over its line. Twin: render::filter::four_pass::line_mean.
+// The glossy filter (§6.3). Twin: render::filter::four_pass. Follows math.wgsl and view.wgsl.
+//
+// `filter_start` weighs the colours by their confidence and finds each pixel's axes, `filter_pass` makes of each value the mean over
+// its line, `filter_end` divides the weights out and adds one Gaussian's share.
 
+// Struct: gpu::render::filter::Params.
 struct Params {
     width: u32,
     height: u32,
@@ -13,9 +17,15 @@ struct Params {
     max_radius: f32,
     steps: f32,
     min_sigma: f32,
+    // Lower clamp of the energy; FAR for no confidence.
+    min_energy: f32,
+    // A pass's share of the variance.
+    split: f32,
+    // Of the kernel's volume.
+    share: f32,
+    // Whether the share is the first.
+    is_first: u32,
 }
-
-const NOT_GLOSSY: u32 = 0xffffffffu;
 
 @group(0) @binding(0) var<storage, read> params: Params;
 // Direction of the major axis, standard deviations of one pass along both.
@@ -26,6 +36,46 @@ const NOT_GLOSSY: u32 = 0xffffffffu;
 // Colour times weight, and the weight.
 @group(0) @binding(4) var<storage, read> source: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read_write> target_values: array<vec4<f32>>;
+
+// What `filter_start` reads and writes.
+@group(0) @binding(1) var<storage, read> start_materials: array<u32>;
+@group(0) @binding(2) var<storage, read> covariances: array<vec4<f32>>;
+// Colour and energy.
+@group(0) @binding(3) var<storage, read> gathered: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> start_axes: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> start_values: array<vec4<f32>>;
+
+// What `filter_end` reads and writes.
+@group(0) @binding(2) var<storage, read> end_materials: array<u32>;
+@group(0) @binding(3) var<storage, read> end_gathered: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read> end_values: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> glossy: array<vec4<f32>>;
+
+fn confidence(color_energy: vec4<f32>, material: u32) -> f32 {
+    if material == NOT_GLOSSY || !all_finite(color_energy.rgb) {
+        return 0.0;
+    }
+    if params.min_energy >= FAR {
+        return 1.0;
+    }
+    return 1.0 / min(max(color_energy.w, max(params.min_energy, 1e-6)), 1e6);
+}
+
+fn standard_deviation(variance: f32) -> f32 {
+    return select(0.0, sqrt(max(variance, 0.0) * params.split), is_finite(variance));
+}
+
+@compute @workgroup_size(16, 4)
+fn filter_start(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.width || id.y >= params.height {
+        return;
+    }
+    let i = id.y * params.width + id.x;
+    let e = eigen(covariances[i].xyz);
+    start_axes[i] = vec4(e.axis, standard_deviation(e.major), standard_deviation(e.minor));
+    let w = confidence(gathered[i], start_materials[i]);
+    start_values[i] = select(vec4(0.0), vec4(gathered[i].rgb * w, w), w > 0.0);
+}
 
 fn line_mean(x: i32, y: i32, i: i32) -> vec4<f32> {
     let own = source[i];
@@ -91,4 +141,25 @@ fn filter_pass(@builtin(global_invocation_id) id: vec3<u32>) {
         let i = id.y * params.width + id.x;
         target_values[i] = line_mean(i32(id.x), i32(id.y), i32(i));
     }
+}
+
+@compute @workgroup_size(16, 4)
+fn filter_end(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.width || id.y >= params.height {
+        return;
+    }
+    let i = id.y * params.width + id.x;
+    let own = end_gathered[i].rgb;
+    // Bit for bit what came in, where nothing was to be filtered.
+    if end_materials[i] == NOT_GLOSSY || axes[i].z < params.min_sigma * 0.5 {
+        glossy[i] = vec4(own, 0.0);
+        return;
+    }
+    let value = end_values[i];
+    var mean = own;
+    if value.w > 0.0 {
+        mean = value.rgb / value.w;
+    }
+    let before = select(glossy[i].rgb, vec3(0.0), params.is_first != 0u);
+    glossy[i] = vec4(before + mean * params.share, 0.0);
 }

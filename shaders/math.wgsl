@@ -78,8 +78,49 @@ fn direction_from_lat_long(uv: vec2<f32>) -> vec3<f32> {
     return vec3(sin(phi) * sin(theta), cos(theta), -cos(phi) * sin(theta));
 }
 
+// atan2 to 2e-7, where a driver's may be off by 4096 ulp: a tenth of a texel of a probe. A polynomial of least relative error up to
+// tan(pi / 8), beyond it by the addition theorem.
+fn angle_of(y: f32, x: f32) -> f32 {
+    let a = abs(x);
+    let b = abs(y);
+    let ratio = min(a, b) / max(max(a, b), MIN_POSITIVE);
+    let turned = ratio > 0.41421356;
+    let t = select(ratio, (ratio - 1.0) / (ratio + 1.0), turned);
+    let z = t * t;
+    let series = t + t * z * (-0.33332955 + z * (0.19977926 + z * (-0.13879849 + z * 0.08060305)));
+    var angle = series + select(0.0, 0.25 * PI, turned);
+    angle = select(angle, 0.5 * PI - angle, b > a);
+    angle = select(angle, PI - angle, sign_of(x) < 0.0);
+    return sign_of(y) * angle;
+}
+
 fn lat_long_from_direction(d: vec3<f32>) -> vec2<f32> {
-    var u = atan2(d.x, -d.z) / TAU;
+    var u = angle_of(d.x, -d.z) / TAU;
     u = select(u, u + 1.0, u < 0.0);
-    return vec2(select(u, 0.0, u >= 1.0), acos(clamp(d.y, -1.0, 1.0)) / PI);
+    let y = clamp(d.y, -1.0, 1.0);
+    return vec2(select(u, 0.0, u >= 1.0), angle_of(sqrt((1.0 - y) * (1.0 + y)), y) / PI);
+}
+
+// Unit direction of the larger eigenvalue of [[x, y], [y, z]], and both.
+struct Eigen {
+    axis: vec2<f32>,
+    major: f32,
+    minor: f32,
+}
+
+fn eigen(c: vec3<f32>) -> Eigen {
+    let mean = 0.5 * (c.x + c.z);
+    let v = vec2(0.5 * (c.x - c.z), c.y);
+    let most = max(abs(v.x), abs(v.y));
+    if most == 0.0 {
+        return Eigen(vec2(1.0, 0.0), mean, mean);
+    }
+    // Half of the angle of v, without its sine and cosine.
+    let size = length(v / most);
+    let d = v / most / size;
+    let larger = sqrt(0.5 * (1.0 + abs(d.x)));
+    let smaller = 0.5 * abs(d.y) / larger;
+    let side = sign_of(d.y);
+    let axis = select(vec2(smaller, side * larger), vec2(larger, side * smaller), d.x >= 0.0);
+    return Eigen(axis, mean + most * size, mean - most * size);
 }

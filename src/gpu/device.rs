@@ -141,7 +141,8 @@ impl Gpu {
             ..wgpu::Limits::default()
         };
         let name = adapter.get_info().name;
-        let request = wgpu::DeviceDescriptor { label: Some("reprobe"), required_limits, ..Default::default() };
+        let required_features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+        let request = wgpu::DeviceDescriptor { label: Some("reprobe"), required_features, required_limits, ..Default::default() };
         let (device, queue) = block_on(adapter.request_device(&request))
             .map_err(|e| Error::Request(format!("GPU \"{name}\" cannot be used: {e}")))?;
         let lost = Arc::new(Mutex::new(None));

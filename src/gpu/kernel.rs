@@ -84,33 +84,57 @@ fn pipeline(
     })
 }
 
+/// The source of shaders that lie in `shaders/`, one after the other.
+macro_rules! shader {
+    ($($name:literal),+) => { concat!($(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $name, ".wgsl"))),+) };
+}
+pub(super) use shader;
+
 impl Gpu {
-    /// A buffer for a kernel to write.
+    /// A buffer for kernels to write.
     pub(super) fn output(&self, label: &'static str, size: u64) -> Result<wgpu::Buffer> {
         self.fits(label, size)?;
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let (label, mapped_at_creation) = (Some(label), false);
         self.checked(|| self.device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation }))
+    }
+
+    /// Fills a buffer with zeros.
+    pub(super) fn clear(&self, buffer: &wgpu::Buffer) {
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(buffer, 0, None);
+        self.queue.submit([encoder.finish()]);
+    }
+
+    /// Hands a kernel's run on `groups` workgroups to the device.
+    pub(super) fn submit(
+        &self,
+        kernel: &Kernel,
+        buffers: &[&wgpu::Buffer],
+        groups: [u32; 2],
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
+    ) {
+        let bindings = buffers.iter().enumerate();
+        let entries: Vec<_> =
+            bindings.map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() }).collect();
+        let layout = &kernel.pipeline.get_bind_group_layout(0);
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
+        pass.set_pipeline(&kernel.pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        if let Some(scene) = &kernel.scene {
+            pass.set_bind_group(1, scene, &[]);
+        }
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        drop(pass);
+        self.queue.submit([encoder.finish()]);
     }
 
     /// Runs a kernel on `groups` workgroups and waits for it.
     pub(super) fn dispatch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 2]) -> Result<()> {
         self.checked(|| {
-            let bindings = buffers.iter().enumerate();
-            let entries: Vec<_> =
-                bindings.map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() }).collect();
-            let layout = &kernel.pipeline.get_bind_group_layout(0);
-            let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries });
-            let mut encoder = self.device.create_command_encoder(&Default::default());
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&kernel.pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            if let Some(scene) = &kernel.scene {
-                pass.set_bind_group(1, scene, &[]);
-            }
-            pass.dispatch_workgroups(groups[0], groups[1], 1);
-            drop(pass);
-            self.queue.submit([encoder.finish()]);
+            self.submit(kernel, buffers, groups, None);
             self.wait();
         })
     }

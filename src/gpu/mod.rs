@@ -4,22 +4,25 @@
 //! but for rounding. Kernels run in dispatches of a second at the most, so that no driver takes the device for hung.
 
 mod camera;
+mod commands;
 mod device;
-mod filter;
 mod follow;
 mod kernel;
+#[cfg(test)]
+mod layout;
 mod light;
 mod pace;
 mod path_trace;
 mod probe;
 mod rays;
+mod render;
 mod scene;
 
 pub use device::{Adapter, Choice, Gpu, adapters};
-pub use filter::Filter;
 pub(crate) use follow::{PathStart, SampleSum};
 pub use light::{LightPaths, LightStart};
 pub use path_trace::PathTracer;
 pub use probe::ProbePaths;
 pub use rays::RayTracer;
+pub use render::{Filter, Renderer};
 pub use scene::GpuScene;

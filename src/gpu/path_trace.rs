@@ -58,6 +58,7 @@ impl PathTracer {
             PATHS,
             include_str!("../../shaders/start.wgsl"),
             include_str!("../../shaders/camera.wgsl"),
+            include_str!("../../shaders/camera_ray.wgsl"),
             include_str!("../../shaders/camera_hits.wgsl"),
         ];
         let hits = Kernel::in_scene(&scene, &source.concat(), "camera_hits", [1, 2], &[])?;

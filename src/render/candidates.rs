@@ -6,6 +6,7 @@ use crate::math::Rgb;
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
 use crate::transport::bsdf::{Lobes, Query};
 use crate::transport::{Hit, World};
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -13,7 +14,7 @@ use std::collections::BTreeMap;
 /// [`Seen::material`] of a texel that sees no surface.
 const NO_SURFACE: u16 = u16::MAX;
 
-/// A probe's texels as the gather sees them, an entry a texel in each list. 72 bytes a texel in all.
+/// A probe's texels as the gather sees them, an entry a texel in each list. 72 bytes a texel in all, the same on a GPU.
 #[derive(Default)]
 pub struct Candidates {
     /// What rules most texels out.
@@ -25,8 +26,8 @@ pub struct Candidates {
 }
 
 /// The reflector's material, and what a mirror there shows.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(16))]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(16))]
 pub struct Seen {
     reflected_point: Vec3,
     reflected_material: u16,
@@ -43,7 +44,8 @@ impl Seen {
 }
 
 /// The reflector's normal, and the direction from it to what it reflects.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub struct Directions {
     /// n, unit shading normal facing the probe; zero where there is no surface.
     pub normal: Vec3,
@@ -52,8 +54,8 @@ pub struct Directions {
 }
 
 /// Colour, and what decides whether it may be blended.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(16))]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(16))]
 pub struct Light {
     /// Glossy radiance.
     pub glossy: Rgb,
@@ -62,7 +64,7 @@ pub struct Light {
     /// Directional albedo of the reflector's non-diffuse lobe towards the probe, at the probe's roughness; 1 where nobody asked.
     pub albedo: Rgb,
     /// Material of the reflected hit.
-    pub reflected_material: u16,
+    pub reflected_material: u32,
 }
 
 impl Candidates {
@@ -87,7 +89,7 @@ impl Candidates {
             Light {
                 glossy: texel.glossy(),
                 albedo: albedo.unwrap_or(Rgb::ONE),
-                reflected_material: texel.reflected_material,
+                reflected_material: u32::from(texel.reflected_material),
                 object: r.as_ref().map_or(u32::MAX, |r| r.object),
             }
         };

@@ -17,7 +17,6 @@ pub(crate) mod four_pass;
 use crate::math::Rgb;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use std::convert::Infallible;
 
 /// [`FilterInput::material`] of a pixel without a glossy surface.
 pub const NOT_GLOSSY: u32 = u32::MAX;
@@ -48,9 +47,6 @@ pub enum Method {
 pub const CORE_SIGMA: f32 = 0.61;
 /// Where the GGX kernel ends: a weight of 1/81.
 pub const TAIL_END: f32 = 8.0;
-/// (1 + q)⁻² as a sum of Gaussians for the passes: each one's share of the kernel's volume and its variance over Σ. Fitted over
-/// 0 <= q <= 8, with 3 % of the volume in the wrong place.
-const GGX_GAUSSIANS: [(f32, f32); 2] = [(0.6167, 3.0786), (0.3833, 0.6322)];
 
 /// How the filter weighs.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -134,12 +130,7 @@ pub fn filter(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
     }
     match params.method {
         Method::Full => full(input, params),
-        Method::FourPass | Method::TwoPass => {
-            let Ok(out) = four_pass::filter_by::<Infallible>(input, params, &|axes, taps, passes| {
-                Ok(four_pass::chain(input.width, params, axes, taps, passes))
-            });
-            out
-        }
+        Method::FourPass | Method::TwoPass => four_pass::four_pass(input, params),
     }
 }
 

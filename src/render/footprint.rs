@@ -106,8 +106,8 @@ pub struct GlossyPoint<'a> {
 #[derive(Debug, Clone)]
 pub struct Footprint {
     /// Standard deviations at focal length 1; alpha outermost, then d_c, then d_r.
-    table: Vec<f32>,
-    params: FootprintParams,
+    pub(crate) table: Vec<f32>,
+    pub(crate) params: FootprintParams,
 }
 
 impl Footprint {

@@ -111,7 +111,7 @@ fn reflected_distance(view: &Reflected, probe: &Reflected) -> f32 {
 }
 
 /// Side of a tile of pixels: what their searches read of a probe, some 100 KB, fits into a core's cache.
-const TILE: usize = 16;
+pub(crate) const TILE: usize = 16;
 
 /// Least t_i: a probe at the far side of the cell still serves a pixel that no other serves.
 const MIN_TRILINEAR: f32 = 1e-6;
@@ -408,6 +408,7 @@ fn albedo_ratio(view: Rgb, w: &WeightedProbe, at: Vec2) -> Rgb {
     (view / probe.max(Rgb::splat(1e-4))).clamp(Rgb::splat(0.25), Rgb::splat(4.0))
 }
 
+/// Directional albedo of the non-diffuse lobe in the view.
 fn view_albedo(world: &World, pixel: &Pixel, roughness_scale: f32) -> Rgb {
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
     let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;

@@ -9,7 +9,6 @@ use super::gather::{GatherParams, Gathered, gather};
 use super::gbuffer::{GBuffer, Pixel, gbuffer};
 use super::mirror::{Reflected, mirror_pass};
 use crate::Result;
-use crate::gpu;
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::probe::placement::{ProbeGrid, ProbeWeight};
@@ -76,14 +75,16 @@ pub struct Frame {
     pub passes: Vec<(&'static str, f64)>,
     /// Sub-pixels that no probe and no earlier frame served.
     pub unserved: usize,
-    /// Per-sub-pixel buffers, for inspection.
-    pub buffers: Buffers,
+    /// Where they were asked for.
+    pub buffers: Option<Buffers>,
 }
 
-/// Per-sub-pixel buffers of a frame, at `supersample` times its size.
+/// Per-sub-pixel buffers of a frame, at `supersample` times its size, for inspection.
 pub struct Buffers {
-    /// The G-buffer.
-    pub view: Arc<GBuffer>,
+    /// Sub-pixels in a row.
+    pub width: usize,
+    /// Principal curvatures, 1/m.
+    pub curvature: Vec<[f32; 2]>,
     /// Mirror hits.
     pub reflected: Vec<Reflected>,
     /// Before the filter.
@@ -102,8 +103,8 @@ pub struct Renderer<'a> {
     pub lightmap: Option<&'a LightMap>,
     /// Parameters.
     pub params: GlossyProbeParams,
-    /// Where the filter runs; `None` for the CPU.
-    pub gpu_filter: Option<gpu::Filter>,
+    /// Whether frames come with their [`Buffers`].
+    pub inspect: bool,
     footprint: Option<Footprint>,
     candidates: NearCandidates,
     previous: Option<Previous>,
@@ -124,7 +125,7 @@ impl<'a> Renderer<'a> {
             curvature,
             lightmap,
             params,
-            gpu_filter: None,
+            inspect: false,
             footprint,
             candidates: NearCandidates::default(),
             previous: None,
@@ -159,7 +160,7 @@ impl<'a> Renderer<'a> {
             None => vec![[0.0; 3]; gathered.len()],
         };
         clock.lap("footprint");
-        let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter, self.gpu_filter.as_ref())?;
+        let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter);
         clock.lap("filter");
         let diffuse = match self.lightmap {
             Some(map) => diffuse_layer(&self.world.scene, &view, map),
@@ -167,22 +168,26 @@ impl<'a> Renderer<'a> {
         };
         let emission: Vec<Rgb> =
             view.pixels.par_iter().zip(&view.background).map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission)).collect();
-        let mut frame = Frame {
-            emission: downsample(&emission, size, n as usize),
-            diffuse: downsample(&diffuse, size, n as usize),
-            glossy: downsample(&glossy, size, n as usize),
-            passes: Vec::new(),
-            unserved,
-            buffers: Buffers { view: view.clone(), reflected, gathered, covariance },
-        };
+        let mut layers = [&emission, &diffuse, &glossy].map(|layer| downsample(layer, size, n as usize));
         clock.lap("composite");
-        let sub = SubPixels { view: &view, reflected: &frame.buffers.reflected, glossy: &glossy, n: n as usize };
-        for (i, covered) in covered_pixels(self.world, self.curvature, self.lightmap, camera, &sub, &self.params.coverage) {
-            (frame.emission[i], frame.diffuse[i], frame.glossy[i]) = (covered.emission, covered.diffuse, covered.glossy);
+        let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
+        for (i, c) in covered_pixels(self.world, self.curvature, self.lightmap, camera, &sub, &self.params.coverage) {
+            for (layer, value) in layers.iter_mut().zip([c.emission, c.diffuse, c.glossy]) {
+                layer[i] = value;
+            }
         }
         clock.lap("coverage");
+        let curvature = |p: &Option<Pixel>| p.as_ref().map_or([0.0; 2], |p| [p.curvature.k1, p.curvature.k2]);
+        let buffers = self.inspect.then(|| Buffers {
+            width: size[0],
+            curvature: view.pixels.iter().map(curvature).collect(),
+            reflected,
+            gathered,
+            covariance,
+        });
         self.previous = Some(Previous { view, glossy });
-        Ok(Frame { passes: clock.laps, ..frame })
+        let [emission, diffuse, glossy] = layers;
+        Ok(Frame { emission, diffuse, glossy, passes: clock.laps, unserved, buffers })
     }
 }
 
@@ -215,14 +220,8 @@ fn footprint_pass(footprint: &Footprint, view: &GBuffer, reflected: &[Reflected]
     pixels.map(|p| of(p).unwrap_or([0.0; 3])).collect()
 }
 
-/// The glossy filter (§6.2) over a view's gathered colours, on the CPU where no `gpu` is given.
-pub fn filter_pass(
-    view: &GBuffer,
-    gathered: &[Gathered],
-    covariance: &[[f32; 3]],
-    params: &FilterParams,
-    gpu: Option<&gpu::Filter>,
-) -> Result<Vec<Rgb>> {
+/// The glossy filter (§6.2) over a view's gathered colours.
+pub fn filter_pass(view: &GBuffer, gathered: &[Gathered], covariance: &[[f32; 3]], params: &FilterParams) -> Vec<Rgb> {
     let [width, height] = view.size();
     let pixels = || view.pixels.par_iter().map(Option::as_ref);
     let material = |p: Option<&Pixel>| p.filter(|p| p.alpha.is_some()).map_or(NOT_GLOSSY, |p| p.surface.material);
@@ -236,25 +235,33 @@ pub fn filter_pass(
         covariance,
         energy: &gathered.par_iter().map(|g| g.energy).collect::<Vec<_>>(),
     };
-    match gpu {
-        Some(gpu) => gpu.filter(&input, params),
-        None => Ok(filter(&input, params)),
-    }
+    filter(&input, params)
 }
 
-struct Clock {
+/// Milliseconds of one pass after the other.
+pub(crate) struct Clock {
     last: Instant,
-    laps: Vec<(&'static str, f64)>,
+    pub(crate) laps: Vec<(&'static str, f64)>,
 }
 
 impl Clock {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self { last: Instant::now(), laps: Vec::new() }
     }
 
-    fn lap(&mut self, pass: &'static str) {
+    /// Leaves out what happened since the last lap.
+    pub(crate) fn restart(&mut self) {
+        self.last = Instant::now();
+    }
+
+    /// Notes what has passed since the last lap, added to what `pass` took before.
+    pub(crate) fn lap(&mut self, pass: &'static str) {
         let now = Instant::now();
-        self.laps.push((pass, (now - self.last).as_secs_f64() * 1e3));
+        let ms = (now - self.last).as_secs_f64() * 1e3;
+        match self.laps.iter_mut().find(|(name, _)| *name == pass) {
+            Some((_, sum)) => *sum += ms,
+            None => self.laps.push((pass, ms)),
+        }
         self.last = now;
     }
 }

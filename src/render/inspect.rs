@@ -1,6 +1,6 @@
 //! Layers that show how a glossy-probe frame came about (`--aov all`).
 
-use super::glossy_probes::Frame;
+use super::glossy_probes::Buffers;
 use super::mirror::{NOTHING, SKY};
 use crate::io::ExrImage;
 use glam::Vec3;
@@ -8,12 +8,10 @@ use glam::Vec3;
 /// Adds the passes' buffers to a frame's image, one sub-pixel (the upper left) for each pixel: `gathered.*` before the filter,
 /// `energy` (Eq. 1; -1 where no probe served), `probe` and `texel.X/Y` of the best sample, `reflected.*`, the reflector's
 /// principal curvatures `curvature.{k1,k2}` in 1/m, and the filter's covariance `covariance.{xx,xy,yy}` in sub-pixels².
-pub fn with_passes(image: ExrImage, frame: &Frame, supersample: u32) -> ExrImage {
+pub fn with_passes(image: ExrImage, b: &Buffers, supersample: u32) -> ExrImage {
     let n = supersample as usize;
-    let fine_width = frame.buffers.view.size()[0];
     let (width, height) = (image.width, image.height);
-    let at: Vec<usize> = (0..width * height).map(|i| i / width * n * fine_width + i % width * n).collect();
-    let b = &frame.buffers;
+    let at: Vec<usize> = (0..width * height).map(|i| i / width * n * b.width + i % width * n).collect();
     let scalar = |f: &dyn Fn(usize) -> f32| at.iter().map(|&i| f(i)).collect::<Vec<f32>>();
     let index = |f: &dyn Fn(usize) -> u32| at.iter().map(|&i| f(i)).collect::<Vec<u32>>();
     let material = |i: usize| match b.reflected[i].material {
@@ -23,7 +21,6 @@ pub fn with_passes(image: ExrImage, frame: &Frame, supersample: u32) -> ExrImage
     };
     let gathered: Vec<Vec3> = at.iter().map(|&i| b.gathered[i].color).collect();
     let texel = |i: usize, axis: usize| b.gathered[i].best.map_or(-1.0, |(_, t)| t[axis]);
-    let curvature = |i: usize| b.view.pixels[i].as_ref().map_or([0.0; 2], |p| [p.curvature.k1, p.curvature.k2]);
     image
         .with_rgb("gathered", &gathered)
         .with_f32("energy", scalar(&|i| if b.gathered[i].energy.is_finite() { b.gathered[i].energy } else { -1.0 }))
@@ -34,8 +31,8 @@ pub fn with_passes(image: ExrImage, frame: &Frame, supersample: u32) -> ExrImage
         .with_f32("reflected.Y", scalar(&|i| b.reflected[i].point.y))
         .with_f32("reflected.Z", scalar(&|i| b.reflected[i].point.z))
         .with_u32("reflected.material", index(&material))
-        .with_f32("curvature.k1", scalar(&|i| curvature(i)[0]))
-        .with_f32("curvature.k2", scalar(&|i| curvature(i)[1]))
+        .with_f32("curvature.k1", scalar(&|i| b.curvature[i][0]))
+        .with_f32("curvature.k2", scalar(&|i| b.curvature[i][1]))
         .with_f32("covariance.xx", scalar(&|i| b.covariance[i][0]))
         .with_f32("covariance.xy", scalar(&|i| b.covariance[i][1]))
         .with_f32("covariance.yy", scalar(&|i| b.covariance[i][2]))

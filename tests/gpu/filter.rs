@@ -22,7 +22,8 @@ fn the_filter_is_the_cpus() {
     let normal: Vec<Vec3> = (0..n).map(place).map(|(x, y)| if y > 0.8 - 0.3 * x { Vec3::Y } else { Vec3::Z }).collect();
     let covariance = |(x, y): (f32, f32)| {
         let (s, c) = (5.0 * x + 2.0 * y).sin_cos();
-        let (a, b) = if y < 0.1 { (0.0, 0.0) } else { ((12.0 * x).powi(2), (3.0 * y).powi(2)) };
+        // No deviation at which rounding decides on the stride, a whole number of steps.
+        let (a, b) = if y < 0.1 { (0.0, 0.0) } else { ((12.1 * x).powi(2), (3.03 * y).powi(2)) };
         [a * c * c + b * s * s, (a - b) * c * s, a * s * s + b * c * c]
     };
     let covariance: Vec<[f32; 3]> = (0..n).map(place).map(covariance).collect();
@@ -40,8 +41,8 @@ fn the_filter_is_the_cpus() {
         [(Kernel::Gaussian, Method::FourPass), (Kernel::Ggx, Method::FourPass), (Kernel::Gaussian, Method::TwoPass)]
     {
         let params = FilterParams { kernel, method, ..FilterParams::default() };
-        let on_gpu = Filter::new(gpu.clone(), &params, n).unwrap();
-        let (a, b) = (on_gpu.filter(&input, &params).unwrap(), filter(&input, &params));
+        let on_gpu = Filter::new(gpu.clone(), &params).unwrap();
+        let (a, b) = (on_gpu.filter(&input).unwrap(), filter(&input, &params));
         let sum: f32 = a.iter().zip(&b).map(|(a, b)| (*a - *b).length_squared()).sum();
         let rmse = (sum / (3 * n) as f32).sqrt();
         assert!(rmse < 1e-3, "{kernel:?}, {method:?}: {rmse}");
@@ -49,8 +50,6 @@ fn the_filter_is_the_cpus() {
         assert!(changed * 2 > n, "the filter did next to nothing");
     }
     let full = FilterParams { method: Method::Full, ..FilterParams::default() };
-    for (params, pixels, expected) in [(full, n, "filter.method"), (FilterParams::default(), 1 << 40, "MiB at the most")] {
-        let Err(error) = Filter::new(gpu.clone(), &params, pixels) else { panic!("made it") };
-        assert!(error.to_string().contains(expected), "{error}");
-    }
+    let Err(error) = Filter::new(gpu, &full) else { panic!("made it") };
+    assert!(error.to_string().contains("filter.method"), "{error}");
 }

@@ -2,6 +2,7 @@
 
 mod bakes;
 mod filter;
+mod frames;
 mod paths;
 mod rays;
 
@@ -10,15 +11,18 @@ use reprobe::transport::World;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A real GPU before a software adapter.
-fn gpu() -> Option<Arc<Gpu>> {
+/// The adapter's name, as `--device` takes it; a real GPU's before a software one's.
+fn device() -> Option<String> {
     let list = adapters();
-    let Some(first) = list.first() else {
+    if list.is_empty() {
         eprintln!("skipped: no adapter; on Debian, mesa-vulkan-drivers has a software one");
-        return None;
-    };
-    let name = Choice::Named(first.name.to_lowercase());
-    Some(Arc::new(Gpu::open(&name).unwrap().unwrap()))
+    }
+    list.first().map(|a| format!("gpu:{}", a.name.to_lowercase()))
+}
+
+fn gpu() -> Option<Arc<Gpu>> {
+    let choice: Choice = device()?.parse().unwrap();
+    Some(Arc::new(Gpu::open(&choice).unwrap().unwrap()))
 }
 
 fn room() -> World {

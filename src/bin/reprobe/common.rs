@@ -177,6 +177,21 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     Ok([side(w)?, side(h)?])
 }
 
+/// Parses a number of bytes: digits, with K, M or G for powers of 1024.
+pub fn parse_bytes(text: &str) -> Result<u64, String> {
+    let expected = || format!("\"{text}\": expected bytes, like 512M or 2G");
+    let digits = text.trim_end_matches(['K', 'M', 'G']);
+    let shift = match &text[digits.len()..] {
+        "" => 0,
+        "K" => 10,
+        "M" => 20,
+        "G" => 30,
+        _ => return Err(expected()),
+    };
+    let number: u64 = digits.parse().map_err(|_| expected())?;
+    number.checked_mul(1 << shift).ok_or_else(expected)
+}
+
 /// Shows a stage's progress with the time left.
 pub struct Bar {
     hidden: bool,

@@ -6,7 +6,7 @@ use crate::render_path::{Args, describe, finish, is_finished, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
 use anyhow::{Context, bail};
-use reprobe::gpu::Filter;
+use reprobe::gpu;
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
@@ -71,27 +71,49 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     // A frame may borrow pixels from the one before it, so the path is rendered as a whole.
     let kept = frames.iter().all(|(path, provenance)| is_finished(path, provenance));
 
-    let (supersample, filter) = (params.supersample, params.filter);
-    let mut renderer = Renderer::new(&world, &curvature, lightmap.as_ref(), params, probes.set.roughness_scale);
+    let supersample = params.supersample;
+    let inspect = args.aov.is_some();
+    let mut engine = None;
     if !kept {
-        let pixels = cameras.iter().map(|c| c.size.iter().map(|&s| (s * supersample) as usize).product()).max().unwrap_or(0);
-        renderer.gpu_filter = common.on_gpu(|gpu| Filter::new(gpu, &filter, pixels))?;
-        timings.device = renderer.gpu_filter.as_ref().map(|f| f.device().to_owned());
+        let scale = probes.set.roughness_scale;
+        let largest = cameras.iter().map(|c| c.size).max_by_key(|[w, h]| w * h).unwrap_or([0, 0]);
+        let on_gpu = common.on_gpu(|gpu| {
+            let memory = args.gpu_memory;
+            let mut renderer = gpu::Renderer::new(gpu, &world, &curvature, lightmap.as_ref(), params.clone(), scale, memory)?;
+            renderer.reserve(largest, probes.set.size)?;
+            Ok(renderer)
+        })?;
+        engine = Some(match on_gpu {
+            Some(mut renderer) => {
+                renderer.inspect = inspect;
+                timings.device = Some(renderer.device().to_owned());
+                timings.clock = if renderer.has_clock() { "gpu" } else { "cpu" };
+                Engine::Gpu(Box::new(renderer))
+            }
+            None => {
+                let mut renderer = Renderer::new(&world, &curvature, lightmap.as_ref(), params, scale);
+                renderer.inspect = inspect;
+                Engine::Cpu(Box::new(renderer))
+            }
+        });
     }
     let bar = common.progress();
     bar.start("glossy-probes", frames.len() as u64);
-    for (camera, (path, provenance)) in cameras.iter().zip(frames) {
+    for (i, (camera, (path, provenance))) in cameras.iter().zip(frames).enumerate() {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut times = FrameTimings { name, kept, ..FrameTimings::default() };
-        if !kept {
-            let frame = renderer.frame(camera, &mut probes)?;
+        if let Some(engine) = &mut engine {
+            let frame = engine.frame(camera, cameras.get(i + 1), &mut probes)?;
             for &(pass, ms) in &frame.passes {
                 times.passes_ms.insert(pass.into(), ms);
             }
-            times.unserved_fraction = Some(frame.unserved as f64 / frame.buffers.gathered.len() as f64);
-            let image = image(&frame, camera, args.aov.is_some().then_some((&*world, supersample)));
+            let sub_pixels = camera.size.iter().map(|&s| f64::from(s * supersample)).product::<f64>();
+            times.unserved_fraction = Some(frame.unserved as f64 / sub_pixels);
+            let image = image(&frame, camera, &world, supersample);
             times.pass("write", || image.with_provenance(provenance).write(&path))?;
         }
+        let on_gpu = engine.as_ref().map_or(0, Engine::gpu_probe_bytes);
+        timings.gpu_probe_memory_bytes = timings.gpu_probe_memory_bytes.max(on_gpu);
         timings.probe_memory_bytes = timings.probe_memory_bytes.max(probes.resident_bytes() as u64);
         timings.frames.push(times);
         bar.advance(1);
@@ -100,15 +122,38 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     finish(timings, &args.output)
 }
 
-fn image(frame: &Frame, camera: &Camera, inspect: Option<(&World, u32)>) -> ExrImage {
+fn image(frame: &Frame, camera: &Camera, world: &World, supersample: u32) -> ExrImage {
     let full: Vec<_> = (0..frame.glossy.len()).map(|i| frame.emission[i] + frame.diffuse[i] + frame.glossy[i]).collect();
     let image = ExrImage::new(camera.size[0] as usize, camera.size[1] as usize)
         .with_rgb("", &full)
         .with_rgb("emission", &frame.emission)
         .with_rgb("diffuse", &frame.diffuse)
         .with_rgb("glossy", &frame.glossy);
-    match inspect {
-        Some((world, supersample)) => with_passes(with_first_hits(image, world, camera), frame, supersample),
+    match &frame.buffers {
+        Some(buffers) => with_passes(with_first_hits(image, world, camera), buffers, supersample),
         None => image,
+    }
+}
+
+/// Where frames are rendered.
+enum Engine<'a> {
+    Cpu(Box<Renderer<'a>>),
+    Gpu(Box<gpu::Renderer<'a>>),
+}
+
+impl Engine<'_> {
+    fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> reprobe::Result<Frame> {
+        match self {
+            Self::Cpu(renderer) => renderer.frame(camera, probes),
+            Self::Gpu(renderer) => renderer.frame(camera, next, probes),
+        }
+    }
+
+    /// Bytes of the probes on the GPU; 0 for the CPU.
+    fn gpu_probe_bytes(&self) -> u64 {
+        match self {
+            Self::Cpu(_) => 0,
+            Self::Gpu(renderer) => renderer.probe_bytes(),
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! `reprobe render-path`.
 
-use crate::common::{Common, Outcome, parse_size};
+use crate::common::{Common, Outcome, parse_bytes, parse_size};
 use crate::render_glossy;
 use crate::timings::{FrameTimings, Timings, timed};
 use crate::views::{FrameList, View, parse_frames, views};
@@ -63,6 +63,9 @@ pub struct Args {
     /// glossy-probes: N x N rays a pixel through all passes
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub supersample: u32,
+    /// glossy-probes: memory that a GPU may be filled with, like 512M or 2G; probes past it are uploaded again
+    #[arg(long, value_name = "SIZE", default_value = "2G", value_parser = parse_bytes)]
+    pub gpu_memory: u64,
     /// glossy-probes: the paper's text in every choice
     #[arg(long)]
     pub paper: bool,
@@ -98,6 +101,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let timings = Timings {
         method: args.method.to_possible_value().map_or_else(String::new, |v| v.get_name().into()),
         threads: rayon::current_num_threads(),
+        clock: "cpu",
         ..Timings::default()
     };
     match args.method {

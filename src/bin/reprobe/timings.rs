@@ -11,8 +11,10 @@ pub struct Timings {
     pub method: String,
     /// Worker threads.
     pub threads: usize,
-    /// The GPU that the frames were made on, or glossy-probes' filter; `None` for the CPU. Its time is the host's, transfers included.
+    /// The GPU that frames were made on; `None` for the CPU.
     pub device: Option<String>,
+    /// Whose clock the passes on the GPU were timed by: "gpu", or "cpu" for the host's, which includes handing them over.
+    pub clock: &'static str,
     /// Scene loading, milliseconds.
     pub load_ms: f64,
     /// Acceleration structures, milliseconds.
@@ -23,6 +25,8 @@ pub struct Timings {
     pub mean_ms: BTreeMap<String, f64>,
     /// Most memory that probes took at once, bytes; 0 for methods without them.
     pub probe_memory_bytes: u64,
+    /// Most memory that probes took at once on the GPU, bytes.
+    pub gpu_probe_memory_bytes: u64,
     /// Most memory that the process has held, bytes; `None` where the system does not say.
     pub peak_memory_bytes: Option<u64>,
 }

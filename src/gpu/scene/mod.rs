@@ -90,6 +90,8 @@ pub struct GpuScene {
     /// The bindings before `scene`, in order.
     fixed: Vec<wgpu::Buffer>,
     params: SceneParams,
+    /// Bytes of the light map.
+    light_bytes: u64,
     pub(super) has_masks: bool,
     pub(super) layout: wgpu::BindGroupLayout,
     pub(super) group: wgpu::BindGroup,
@@ -158,7 +160,7 @@ impl GpuScene {
         let layout = gpu.checked(|| layout(&gpu.device, "scene", BINDINGS, 0))?;
         let has_masks = world.scene.materials.iter().any(|m| m.opacity.is_some());
         let group = group(&gpu, &layout, &fixed, params, &[], &[])?;
-        Ok(Self { gpu, fixed, params, has_masks, layout, group })
+        Ok(Self { gpu, fixed, params, light_bytes: 0, has_masks, layout, group })
     }
 
     /// The same scene with a light map to look diffuse light up in.
@@ -172,7 +174,13 @@ impl GpuScene {
         let corners: Vec<[f32; 2]> = map.corners.iter().flatten().map(|p| p.to_array()).collect();
         let group = group(&self.gpu, &self.layout, &self.fixed, params, &texels, &corners)?;
         let (gpu, layout) = (self.gpu.clone(), self.layout.clone());
-        Ok(Self { gpu, fixed: self.fixed.clone(), params, has_masks: self.has_masks, layout, group })
+        let light_bytes = (size_of_val(texels.as_slice()) + size_of_val(corners.as_slice())) as u64;
+        Ok(Self { gpu, fixed: self.fixed.clone(), params, light_bytes, has_masks: self.has_masks, layout, group })
+    }
+
+    /// What it takes on the device, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        self.fixed.iter().map(wgpu::Buffer::size).sum::<u64>() + self.light_bytes
     }
 
     /// Whether there is a light map to look diffuse light up in.

@@ -1,0 +1,262 @@
+//! Frames by glossy probes on a device: the twin of [`crate::render::glossy_probes`]. A pass's data stays on the device; the layers come back.
+//!
+//! Probes are gathered from one after the other, so that a frame is right with memory for a single one.
+
+mod composite;
+mod filter;
+mod footprint;
+mod gather;
+mod gbuffer;
+mod probes;
+mod view;
+
+pub use filter::Filter;
+
+use super::Gpu;
+use super::commands::Commands;
+use super::scene::GpuScene;
+use crate::lightmap::LightMap;
+use crate::probe::file::Probe;
+use crate::probe::store::ProbeStore;
+use crate::render::candidates::Candidates;
+use crate::render::footprint::FootprintParams;
+use crate::render::gather::Gathered;
+use crate::render::glossy_probes::{Buffers, Clock, Frame, GlossyProbeParams, nearest_probes};
+use crate::scene::Camera;
+use crate::surface::CurvatureMap;
+use crate::transport::World;
+use crate::{Error, Result};
+use composite::{Composite, Layers};
+use filter::{Planes, Scratch};
+use footprint::Footprint;
+use gather::{Gather, Sums};
+use gbuffer::GBuffer;
+use glam::{Vec2, Vec4, Vec4Swizzles};
+use probes::{Place, Resident};
+use std::sync::Arc;
+use view::{Guides, View};
+
+/// Stands for infinity in shaders.
+const FAR: f32 = f32::MAX;
+/// Edges of a workgroup, pixels.
+const WORKGROUP: [u32; 2] = [16, 4];
+
+/// Workgroups that cover a picture.
+fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
+    [size[0].div_ceil(workgroup[0]), size[1].div_ceil(workgroup[1])]
+}
+
+/// The buffers of frames of one size.
+struct Target {
+    view: View,
+    /// The view of the frame before, and its camera.
+    last: Guides,
+    last_camera: Option<Camera>,
+    sums: Sums,
+    /// Colour and energy before the filter.
+    gathered: wgpu::Buffer,
+    covariances: wgpu::Buffer,
+    scratch: Scratch,
+    /// Filtered; as long as nothing has been filtered, the frame's before.
+    glossy: wgpu::Buffer,
+    layers: Layers,
+}
+
+impl Target {
+    /// Bytes a sub-pixel, but for the layers and the anchors.
+    const BYTES: u64 = View::BYTES + 20 + 8 * 16;
+
+    fn new(gpu: &Gpu, size: [u32; 2], params: &GlossyProbeParams) -> Result<Self> {
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        Ok(Self {
+            view: View::new(gpu, size)?,
+            last: Guides::new(gpu, pixels)?,
+            last_camera: None,
+            sums: Sums::new(gpu, size, &params.gather)?,
+            gathered: gpu.output("gathered colours", 16 * pixels)?,
+            covariances: gpu.output("covariances", 16 * pixels)?,
+            scratch: Scratch::new(gpu, pixels)?,
+            glossy: gpu.output("filtered colours", 16 * pixels)?,
+            layers: Layers::new(gpu, pixels / u64::from(params.supersample * params.supersample))?,
+        })
+    }
+}
+
+/// What stays the same from frame to frame.
+pub struct Renderer<'a> {
+    /// Whether frames come with their [`Buffers`].
+    pub inspect: bool,
+    gpu: Arc<Gpu>,
+    scene: GpuScene,
+    world: &'a World,
+    params: GlossyProbeParams,
+    roughness_scale: f32,
+    memory: u64,
+    gbuffer: GBuffer,
+    gather: Gather,
+    footprint: Option<Footprint>,
+    filter: Filter,
+    composite: Composite,
+    resident: Resident,
+    target: Option<Target>,
+}
+
+impl<'a> Renderer<'a> {
+    /// Compiles the passes; as [`crate::render::glossy_probes::Renderer::new`]. `memory` is what all of it may take on the device, bytes.
+    pub fn new(
+        gpu: Arc<Gpu>,
+        world: &'a World,
+        curvature: &CurvatureMap,
+        lightmap: Option<&LightMap>,
+        params: GlossyProbeParams,
+        roughness_scale: f32,
+        memory: u64,
+    ) -> Result<Self> {
+        let footprint = params.footprint.map(|f| {
+            let table = crate::render::footprint::Footprint::new(&FootprintParams { roughness_scale, ..f });
+            Footprint::new(&gpu, &table)
+        });
+        let scene = GpuScene::new(gpu.clone(), world)?;
+        let scene = if let Some(map) = lightmap { scene.with_lightmap(map)? } else { scene };
+        Ok(Self {
+            inspect: false,
+            world,
+            roughness_scale,
+            memory,
+            gbuffer: GBuffer::new(&scene, world, curvature)?,
+            scene,
+            gather: Gather::new(&gpu, &params.gather)?,
+            footprint: footprint.transpose()?,
+            filter: Filter::new(gpu.clone(), &params.filter)?,
+            composite: Composite::new(&gpu, params.supersample)?,
+            resident: Resident::new(0),
+            target: None,
+            params,
+            gpu,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        &self.gpu.adapter.name
+    }
+
+    /// Whether passes are timed by the device's own clock.
+    pub fn has_clock(&self) -> bool {
+        self.gpu.adapter.timestamps
+    }
+
+    /// Bytes of the probes on the device.
+    pub fn probe_bytes(&self) -> u64 {
+        self.resident.bytes()
+    }
+
+    /// Makes room for frames of `size` and for at least one probe of so many texels. An error where memory does not suffice.
+    pub fn reserve(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<()> {
+        let n = self.params.supersample;
+        let fine = size.map(|s| s * n);
+        if self.target.as_ref().is_some_and(|t| t.view.size == fine) {
+            return Ok(());
+        }
+        self.target = None;
+        let area = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
+        let frame = area(fine) * Target::BYTES + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
+        let probe = area(probe) * probes::TEXEL;
+        if frame + probe > self.memory {
+            let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+            return Err(Error::Request(format!(
+                "--gpu-memory: frames of {}x{} take {} MiB and a probe {} MiB, but {} MiB are allowed; give more, or use --device cpu",
+                size[0],
+                size[1],
+                mib(frame),
+                mib(probe),
+                mib(self.memory)
+            )));
+        }
+        self.resident.set_budget(self.memory - frame);
+        self.target = Some(Target::new(&self.gpu, fine, &self.params)?);
+        Ok(())
+    }
+
+    /// Renders the next frame of a path; meanwhile probes are uploaded for the one after it, where there is `next`.
+    pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
+        self.reserve(camera.size, probes.set.size)?;
+        let gpu = self.gpu.clone();
+        gpu.checked(|| self.passes(camera, next, probes))?
+    }
+
+    fn passes(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
+        let Some(t) = &mut self.target else { unreachable!("reserved") };
+        let (gpu, params, eye) = (&*self.gpu, &self.params, camera.position());
+        let fine = Camera { size: t.view.size, ..camera.clone() };
+        let albedos = params.gather.albedo_ratio.then_some(self.roughness_scale);
+        let mut clock = Clock::start();
+        let mut commands = Commands::new(gpu);
+
+        self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, albedos)?;
+        gpu.clear(&t.sums.sums);
+        self.resident.begin_frame();
+        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos);
+        for (index, weight) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
+            clock.restart();
+            let probe = probes.probe(index)?;
+            let there = self.resident.get(gpu, index, &probe, || candidates(&probe))?;
+            clock.lap("load");
+            self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &Place::new(index, &probe, weight)), &t.sums)?;
+        }
+        let previous = (t.last_camera.as_ref(), &t.last, &t.glossy);
+        self.composite.fill(gpu, &mut commands, (&t.view, &fine, &t.gathered), &t.sums, previous, &t.layers)?;
+        match &self.footprint {
+            Some(footprint) => footprint.run(gpu, &mut commands, &fine, &t.view, &t.covariances)?,
+            None => gpu.clear(&t.covariances),
+        }
+        let (view, scratch) = (&t.view, &t.scratch);
+        let planes = Planes {
+            size: view.size,
+            guides: &view.guides,
+            gathered: &t.gathered,
+            covariances: &t.covariances,
+            scratch,
+            glossy: &t.glossy,
+        };
+        self.filter.run(&mut commands, &planes)?;
+        self.composite.layers(gpu, &mut commands, (view, &fine), &t.glossy, &t.layers)?;
+        clock.restart();
+        for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
+            // What fails here fails again when that frame is rendered.
+            if let Ok(probe) = probes.probe(index) {
+                self.resident.upload_ahead(gpu, index, &probe, || candidates(&probe))?;
+            }
+        }
+        clock.lap("load");
+        let passes = commands.finish()?;
+
+        clock.restart();
+        let ([emission, diffuse, glossy], unserved) = t.layers.read(gpu)?;
+        clock.lap("read");
+        let buffers = if self.inspect { Some(t.read(gpu)?) } else { None };
+        std::mem::swap(&mut t.view.guides, &mut t.last);
+        t.last_camera = Some(fine);
+        let passes = [clock.laps, passes].concat();
+        Ok(Frame { emission, diffuse, glossy, passes, unserved, buffers })
+    }
+}
+
+impl Target {
+    fn read(&self, gpu: &Gpu) -> Result<Buffers> {
+        let (colors, sums): (Vec<Vec4>, Vec<Vec4>) = (gpu.read(&self.gathered)?, gpu.read(&self.sums.sums)?);
+        let best: Vec<[u32; 4]> = gpu.read(&self.sums.best)?;
+        let gathered = |((c, s), b): ((&Vec4, &Vec4), &[u32; 4])| Gathered {
+            color: c.xyz(),
+            energy: if c.w < FAR { c.w } else { f32::INFINITY },
+            best: (s.w > 0.0).then(|| (b[3] as usize, Vec2::new(f32::from_bits(b[1]), f32::from_bits(b[2])))),
+        };
+        Ok(Buffers {
+            width: self.view.size[0] as usize,
+            curvature: gpu.read::<Vec4>(&self.view.curvatures)?.iter().map(|c| [c.x, c.y]).collect(),
+            reflected: self.view.read_reflected(gpu)?,
+            gathered: colors.iter().zip(&sums).zip(&best).map(gathered).collect(),
+            covariance: gpu.read::<Vec4>(&self.covariances)?.iter().map(|c| c.xyz().to_array()).collect(),
+        })
+    }
+}
