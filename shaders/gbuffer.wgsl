@@ -63,6 +63,15 @@ fn curvature_at(s: Surface, n: vec3<f32>) -> vec4<f32> {
     return vec4(e.major, e.minor, e.axis);
 }
 
+// Alpha of the glossy lobe that a view has; negative where it has none.
+fn view_alpha(s: Surface, is_front: bool) -> f32 {
+    let m = materials[s.material];
+    if (m.lobes & NON_DIFFUSE) != 0u && (is_front || (m.flags & TWO_SIDED_FLAG) != 0u) {
+        return bsdf_alpha(s);
+    }
+    return -1.0;
+}
+
 @compute @workgroup_size(8, 8)
 fn gbuffer(@builtin(global_invocation_id) id: vec3<u32>) {
     let camera = params.camera;
@@ -85,11 +94,7 @@ fn gbuffer(@builtin(global_invocation_id) id: vec3<u32>) {
     let wo = -ray.direction;
     let is_front = dot(s.frame.n, wo) > 0.0;
     let n = facing_normal(s, wo);
-    let m = materials[s.material];
-    var alpha = -1.0;
-    if (m.lobes & NON_DIFFUSE) != 0u && (is_front || (m.flags & TWO_SIDED_FLAG) != 0u) {
-        alpha = bsdf_alpha(s);
-    }
+    let alpha = view_alpha(s, is_front);
     out_positions[i] = vec4(s.p, alpha);
     out_normals[i] = vec4(n, s.t);
     out_curvatures[i] = curvature_at(s, n);

@@ -122,7 +122,7 @@ fn frames_are_the_cpus() {
         // One probe, so that some pixels come from the frame before; sub-pixels, and the kernel with tails.
         ("fine", "--set gather.probes=1 --supersample 2 --set filter.kernel=ggx --set gather.bilinear=nearest"),
         // Memory for hardly more than one probe of the eight.
-        ("small", "--gpu-memory 3M --set gather.albedo_ratio=false --set gather.anchors=3"),
+        ("small", "--gpu-memory 7M --set gather.albedo_ratio=false --set gather.anchors=3"),
     ] {
         let (frames, timings) = baked.both(name, &format!("{options} --aov all"));
         for (n, images) in frames.iter().enumerate() {

@@ -26,7 +26,8 @@ struct Params {
 
 /// A frame's layers on the device.
 pub(super) struct Layers {
-    planes: [wgpu::Buffer; 3],
+    /// Emission, diffuse and glossy.
+    pub(super) planes: [wgpu::Buffer; 3],
     unserved: wgpu::Buffer,
 }
 

@@ -3,6 +3,7 @@
 //! Probes are gathered from one after the other, so that a frame is right with memory for a single one.
 
 mod composite;
+mod coverage;
 mod filter;
 mod footprint;
 mod gather;
@@ -27,6 +28,7 @@ use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::{Error, Result};
 use composite::{Composite, Layers};
+use coverage::Coverage;
 use filter::{Planes, Scratch};
 use footprint::Footprint;
 use gather::{Gather, Sums};
@@ -97,6 +99,7 @@ pub struct Renderer<'a> {
     footprint: Option<Footprint>,
     filter: Filter,
     composite: Composite,
+    coverage: Option<Coverage>,
     resident: Resident,
     target: Option<Target>,
 }
@@ -124,6 +127,10 @@ impl<'a> Renderer<'a> {
             roughness_scale,
             memory,
             gbuffer: GBuffer::new(&scene, world, curvature)?,
+            coverage: match params.coverage.rays {
+                0 => None,
+                rays => Some(Coverage::new(&scene, rays)?),
+            },
             scene,
             gather: Gather::new(&gpu, &params.gather)?,
             footprint: footprint.transpose()?,
@@ -221,6 +228,9 @@ impl<'a> Renderer<'a> {
         };
         self.filter.run(&mut commands, &planes)?;
         self.composite.layers(gpu, &mut commands, (view, &fine), &t.glossy, &t.layers)?;
+        if let Some(coverage) = &self.coverage {
+            coverage.run(&self.scene, &mut commands, camera, (view, &t.glossy), &t.layers)?;
+        }
         clock.restart();
         for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
             // What fails here fails again when that frame is rendered.

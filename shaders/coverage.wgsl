@@ -1,0 +1,165 @@
+// Antialiasing by coverage: more rays where an edge runs across a pixel. Twin: src/render/coverage.rs. Follows gbuffer.wgsl's files.
+
+// Struct: gpu::render::coverage::Params.
+struct CoverageParams {
+    // At the frame's size.
+    camera: Camera,
+    // Sub-pixels of the view along a pixel's side, and rays.
+    sub_pixels: u32,
+    rays: u32,
+    padding0: u32,
+    padding1: u32,
+}
+
+const MIN_NORMAL_COS: f32 = 0.9;
+const DEPTH_TOLERANCE: f32 = 0.02;
+const SHARP_ALPHA: f32 = 0.05;
+const REFLECTED_TOLERANCE: f32 = 0.05;
+
+@group(0) @binding(0) var<storage, read> coverage: CoverageParams;
+// The planes of the view, the filtered colours.
+@group(0) @binding(1) var<storage, read> view_hits: array<Hit>;
+@group(0) @binding(2) var<storage, read> view_positions: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> view_normals: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read> view_reflected: array<Reflected>;
+@group(0) @binding(5) var<storage, read> view_glossy: array<vec4<f32>>;
+// The frame's layers.
+@group(0) @binding(6) var<storage, read_write> frame_emission: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read_write> frame_diffuse: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> frame_glossy: array<vec4<f32>>;
+
+// What decides whether two rays see the same.
+struct Seen {
+    p: vec3<f32>,
+    normal: vec3<f32>,
+    depth: f32,
+    // Negative without a glossy lobe.
+    alpha: f32,
+    // NONE where nothing is seen.
+    material: u32,
+}
+
+fn seen_at(i: u32) -> Seen {
+    let triangle = view_hits[i].triangle;
+    var material = NONE;
+    if triangle != NO_TRIANGLE {
+        material = facets[7u * triangle + 6u].y;
+    }
+    let p = view_positions[i];
+    let n = view_normals[i];
+    return Seen(p.xyz, n.xyz, n.w, p.w, material);
+}
+
+fn same_surface(a: Seen, b: Seen) -> bool {
+    return a.material == b.material && dot(a.normal, b.normal) > MIN_NORMAL_COS
+        && abs(dot(a.normal, b.p - a.p)) < DEPTH_TOLERANCE * a.depth;
+}
+
+fn same_reflected(at: Seen, a: Reflected, b: Reflected) -> bool {
+    let reach = select(distance(a.point, at.p) + at.depth, 1.0, a.material == SKY);
+    return a.material == b.material && distance(a.point, b.point) < REFLECTED_TOLERANCE * reach;
+}
+
+fn is_sharp(s: Seen) -> bool {
+    return s.alpha >= 0.0 && s.alpha <= SHARP_ALPHA;
+}
+
+// First and last sub-pixel, each way, of a pixel and those around it.
+fn window(pixel: vec2<u32>) -> vec4<u32> {
+    let n = coverage.sub_pixels;
+    let size = vec2(coverage.camera.width, coverage.camera.height) * n;
+    let low = max(pixel * n, vec2(1u)) - 1u;
+    return vec4(low, min((pixel + 1u) * n, size - 1u));
+}
+
+fn has_edge(w: vec4<u32>, width: u32) -> bool {
+    let first = w.y * width + w.x;
+    let a = seen_at(first);
+    let sharp = is_sharp(a);
+    for (var y = w.y; y <= w.w; y++) {
+        for (var x = w.x; x <= w.z; x++) {
+            let i = y * width + x;
+            let b = seen_at(i);
+            let both_see_nothing = a.material == NONE && b.material == NONE;
+            let same = i == first || both_see_nothing
+                || (same_surface(a, b) && (!sharp || same_reflected(a, view_reflected[first], view_reflected[i])));
+            if !same {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+// The glossy radiance of what a ray at `at` (sub-pixels) sees: that of the sub-pixels that show the same, the nearest most.
+fn glossy_of(w: vec4<u32>, width: u32, seen: Seen, mirrored: Reflected, at: vec2<f32>) -> vec3<f32> {
+    // Same surface and reflection; same surface; whatever is nearest.
+    var all: array<vec4<f32>, 3>;
+    for (var y = w.y; y <= w.w; y++) {
+        for (var x = w.x; x <= w.z; x++) {
+            let i = y * width + x;
+            let other = seen_at(i);
+            if other.material == NONE || other.alpha < 0.0 {
+                continue;
+            }
+            let d = vec2(f32(x), f32(y)) + 0.5 - at;
+            let weighted = vec4(view_glossy[i].rgb, 1.0) * (1.0 / (dot(d, d) + 0.1));
+            let surface = same_surface(seen, other);
+            let reflection = surface && (!is_sharp(seen) || same_reflected(seen, mirrored, view_reflected[i]));
+            all[0] += select(vec4(0.0), weighted, reflection);
+            all[1] += select(vec4(0.0), weighted, surface);
+            all[2] += weighted;
+        }
+    }
+    var best = select(all[1], all[0], all[0].w > 0.0);
+    best = select(all[2], best, best.w > 0.0);
+    return select(vec3(0.0), best.rgb / best.w, best.w > 0.0);
+}
+
+@compute @workgroup_size(8, 8)
+fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
+    let camera = coverage.camera;
+    if id.x >= camera.width || id.y >= camera.height {
+        return;
+    }
+    let width = camera.width * coverage.sub_pixels;
+    let w = window(id.xy);
+    if !has_edge(w, width) {
+        return;
+    }
+    var emission = vec3(0.0);
+    var diffuse = vec3(0.0);
+    var glossy = vec3(0.0);
+    let rays = coverage.rays;
+    for (var k = 0u; k < rays * rays; k++) {
+        let at = vec2<f32>(id.xy) + (vec2(f32(k % rays), f32(k / rays)) + 0.5) / f32(rays);
+        let ray = camera_ray(camera, at, vec2(0.5));
+        let hit = traverse(ray, false);
+        if hit.triangle == NO_TRIANGLE {
+            emission += environment(ray.direction);
+            continue;
+        }
+        let s = surface_at(hit);
+        let wo = -ray.direction;
+        let wi = to_local(s.frame, wo);
+        if s.emitter != NONE && wi.z > 0.0 {
+            emission += emitted(s);
+        }
+        if scene.light_width > 0u {
+            diffuse += bsdf_diffuse_out(s, wi) * lightmap_lookup(s.triangle, s.barycentric, wi.z < 0.0) * FRAC_1_PI;
+        }
+        let seen = Seen(s.p, facing_normal(s, wo), s.t, view_alpha(s, wi.z > 0.0), s.material);
+        if seen.alpha >= 0.0 {
+            var mirrored = Reflected(vec3(0.0), NOTHING);
+            if is_sharp(seen) {
+                mirrored = mirror_hit(s, wo);
+            }
+            glossy += glossy_of(w, width, seen, mirrored, at * f32(coverage.sub_pixels));
+        }
+    }
+    let scale = 1.0 / f32(rays * rays);
+    let out = id.y * camera.width + id.x;
+    frame_emission[out] = vec4(emission * scale, 0.0);
+    frame_diffuse[out] = vec4(diffuse * scale, 0.0);
+    frame_glossy[out] = vec4(glossy * scale, 0.0);
+}

@@ -1,0 +1,72 @@
+//! Rays along edges: the twin of [`crate::render::coverage`].
+
+use super::super::camera::GpuCamera;
+use super::super::commands::Commands;
+use super::super::kernel::{Kernel, shader};
+use super::super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
+use super::composite::Layers;
+use super::groups;
+use super::view::View;
+use crate::Result;
+use crate::scene::Camera;
+use bytemuck::{Pod, Zeroable};
+
+/// Edges of a workgroup, pixels.
+const WORKGROUP: [u32; 2] = [8, 8];
+
+/// `CoverageParams` of coverage.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    camera: GpuCamera,
+    sub_pixels: u32,
+    rays: u32,
+    padding: [u32; 2],
+}
+
+fn source() -> String {
+    [RAYS, MATERIALS, PATHS, shader!("camera", "camera_ray", "view", "mirror", "gbuffer", "coverage")].concat()
+}
+
+/// The kernel.
+pub(super) struct Coverage {
+    kernel: Kernel,
+    rays: u32,
+}
+
+impl Coverage {
+    /// For N x N rays a pixel.
+    pub(super) fn new(scene: &GpuScene, rays: u32) -> Result<Self> {
+        Ok(Self { kernel: Kernel::in_scene(scene, &source(), "cover", [6, 3], &[])?, rays })
+    }
+
+    /// Renders the pixels along edges anew. `camera` is of the frame's size.
+    pub(super) fn run(
+        &self,
+        scene: &GpuScene,
+        commands: &mut Commands,
+        camera: &Camera,
+        (view, glossy): (&View, &wgpu::Buffer),
+        layers: &Layers,
+    ) -> Result<()> {
+        let params =
+            Params { camera: camera.into(), sub_pixels: view.size[0] / camera.size[0], rays: self.rays, padding: [0; 2] };
+        let params = scene.gpu.upload("the coverage's parameters", bytemuck::bytes_of(&params))?;
+        let [emission, diffuse, out] = &layers.planes;
+        let (positions, normals) = (&view.positions, &view.guides.normals);
+        let buffers = [&params, &view.hits, positions, normals, &view.reflected, glossy, emission, diffuse, out];
+        commands.run("coverage", &self.kernel, &buffers, groups(camera.size, WORKGROUP));
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::layout::check;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(&source(), Params as "CoverageParams" { camera, sub_pixels, rays });
+    }
+}
