@@ -6,7 +6,9 @@ mod common;
 mod compare;
 mod curvature;
 mod devices;
+mod evaluate;
 mod info;
+mod pipeline;
 mod place_probes;
 mod probe_set;
 mod qhmap;
@@ -45,6 +47,7 @@ enum Command {
     Devices(devices::Args),
     Info(info::Args),
     Run(run::Args),
+    Evaluate(evaluate::Args),
 }
 
 fn main() -> ExitCode {
@@ -79,5 +82,6 @@ fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
         Command::Devices(args) => devices::run(args, common),
         Command::Info(args) => info::run(args, common),
         Command::Run(args) => run::run(args, common),
+        Command::Evaluate(args) => evaluate::run(args, common),
     }
 }

@@ -69,12 +69,25 @@ pub struct Args {
     pub set: Vec<String>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Method {
+/// How frames are rendered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Method {
     /// Glossy probes, reprojected
     GlossyProbes,
     /// The reference: path tracing
     PathTrace,
+}
+
+impl Method {
+    /// Whether it reads what other stages have baked.
+    pub fn needs_bakes(self) -> bool {
+        self != Self::PathTrace
+    }
+
+    /// Whether it may read other texels of the probes than a bake for a path has.
+    pub fn reads_any_texel(self) -> bool {
+        !matches!(self, Self::GlossyProbes | Self::PathTrace)
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -164,7 +177,7 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
 
 /// Writes `timings.json` and sums up the run.
 pub fn finish(mut timings: Timings, output: &Path) -> anyhow::Result<Outcome> {
-    timings.finish();
+    timings.finish(&output.join("timings.json"));
     atomic::write_json(&output.join("timings.json"), &timings)?;
     let kept = timings.frames.iter().filter(|f| f.kept).count();
     let count = timings.frames.len();

@@ -1,11 +1,12 @@
 //! `timings.json`: milliseconds a pass and frame, and memory. Kept apart from the frames, whose bits must not depend on it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// What a run took.
-#[derive(Serialize, Default)]
+#[derive(Serialize, Deserialize, Default)]
 pub struct Timings {
     /// `--method`.
     pub method: String,
@@ -19,7 +20,7 @@ pub struct Timings {
     pub build_ms: f64,
     /// Frames in order.
     pub frames: Vec<FrameTimings>,
-    /// Mean of each pass over the frames rendered in this run, milliseconds.
+    /// Mean of each pass over the frames whose times are known, milliseconds.
     pub mean_ms: BTreeMap<String, f64>,
     /// Most memory that probes took at once, bytes; 0 for methods without them.
     pub probe_memory_bytes: u64,
@@ -28,7 +29,7 @@ pub struct Timings {
 }
 
 /// What a frame took.
-#[derive(Serialize, Default)]
+#[derive(Serialize, Deserialize, Default)]
 pub struct FrameTimings {
     /// File name.
     pub name: String,
@@ -36,13 +37,29 @@ pub struct FrameTimings {
     pub kept: bool,
     /// Share of sub-pixels that neither a probe nor the frame before served; `None` for methods without probes.
     pub unserved_fraction: Option<f64>,
-    /// Milliseconds of each pass.
+    /// Milliseconds of each pass, in the run that rendered the frame.
     pub passes_ms: BTreeMap<String, f64>,
 }
 
 impl Timings {
-    /// Fills in the means and the memory.
-    pub fn finish(&mut self) {
+    /// Reads what [`Timings::finish`] led to; `None` where there is no such file.
+    pub fn read(path: &Path) -> Option<Self> {
+        serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()
+    }
+
+    /// Fills in the means and the memory; frames that were kept have the times that the `earlier` file tells of them.
+    pub fn finish(&mut self, earlier: &Path) {
+        let written = |path: &Path| path.metadata().and_then(|m| m.modified()).ok();
+        if let Some(found) = self.frames.iter().any(|f| f.kept).then(|| Self::read(earlier)).flatten() {
+            self.probe_memory_bytes = self.probe_memory_bytes.max(found.probe_memory_bytes);
+            for before in found.frames {
+                // A frame newer than the file is of a run that was stopped before it could write its times.
+                let known = written(&earlier.with_file_name(&before.name)) <= written(earlier);
+                if let Some(frame) = self.frames.iter_mut().find(|f| known && f.kept && f.name == before.name) {
+                    *frame = FrameTimings { kept: true, ..before };
+                }
+            }
+        }
         let mut sums = BTreeMap::<String, (f64, u32)>::new();
         for (pass, ms) in self.frames.iter().flat_map(|f| &f.passes_ms) {
             let (sum, count) = sums.entry(pass.clone()).or_default();
