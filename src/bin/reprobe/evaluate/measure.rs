@@ -11,8 +11,7 @@ use reprobe::metric::temporal::{change, signed_error};
 use reprobe::metric::{compare, display};
 use reprobe::progress::Progress;
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What is measured.
 pub struct Subjects<'a> {
@@ -72,17 +71,15 @@ pub fn measure(subjects: &Subjects, layers: &[&str], common: &Common) -> anyhow:
     let jobs: Vec<(usize, usize, usize)> = (0..layers.len())
         .flat_map(|layer| (0..subjects.methods.len()).flat_map(move |method| (0..count).map(move |frame| (layer, method, frame))))
         .collect();
-    let middle: Vec<usize> = jobs
-        .iter()
-        .filter(|j| j.2 == count / 2)
-        .map(|j| measure_frame(subjects, layers, *j, true))
-        .try_fold(Vec::new(), |mut sizes, result| {
-            let (_, pictures) = result?;
-            sizes.push(pictures.map_or(0, |p| p[0].len() + p[1].len()));
-            anyhow::Ok(sizes)
-        })?;
+    let sizes: Vec<usize> = jobs
+        .par_iter()
+        .filter(|job| job.2 == count / 2)
+        .map(|&job| {
+            anyhow::Ok(measure_frame(subjects, layers, job, true)?.1.map_or(0, |[picture, map]| picture.len() + map.len()))
+        })
+        .collect::<anyhow::Result<_>>()?;
     // The reference's pictures, and what base64 adds.
-    let a_frame = (middle.iter().sum::<usize>() + middle.iter().max().unwrap_or(&0) * layers.len()) * 4 / 3;
+    let a_frame = (sizes.iter().sum::<usize>() + sizes.iter().max().unwrap_or(&0) * layers.len()) * 4 / 3;
     let every = (count * a_frame).div_ceil(subjects.page_bytes.max(1)).max(1);
 
     let bar = common.progress();
