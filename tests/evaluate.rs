@@ -158,11 +158,15 @@ fn wrong_requests_are_refused_before_anything_is_baked() {
         assert!(message.contains(expected), "{args}: {message}");
     }
     assert!(!f.at("out").exists());
-    let output = f.evaluate("--ablations paper --dry-run");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let dry = |args: &str| String::from_utf8_lossy(&f.evaluate(&format!("{args} --dry-run")).stdout).into_owned();
+    let text = dry("--ablations paper");
     for part in ["--lat-long", "--roughness-scale 1", "--count 6 ", "--count 24 ", "--alternative", "--seed 1", "footprint=null"]
     {
         assert!(text.contains(part), "{part}: {text}");
     }
+    let text = dry("--methods lightmap-rt,path-trace");
+    assert!(text.contains("bake-lightmap") && !text.contains("bake-probes") && !text.contains("place-probes"), "{text}");
+    let text = dry("--methods glossy-probes,ulr");
+    assert!(text.contains("bake-probes") && !text.contains("--for-path"), "ulr wants any texel: {text}");
     assert!(!f.at("out").exists());
 }

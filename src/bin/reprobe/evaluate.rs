@@ -6,7 +6,7 @@ mod variant;
 
 use crate::common::{Common, Outcome, parse_size};
 use crate::pipeline::{Preset, Settings};
-use crate::timings::Timings;
+use crate::timings::{Timings, frame_ms, is_rendering};
 use crate::views::{FrameList, parse_frames, views};
 use anyhow::bail;
 use measure::{Subjects, file, layers, measure};
@@ -32,6 +32,8 @@ use variant::{Ablations, Given, Variant, WHOLE, parse_bake};
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --ablations paper --preset medium --reference mitsuba/
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --probes probes/ --lightmap lightmap.exr \\
       --variant one=glossy-probes,gather.probes=1 --variant fast=path-trace,--spp=4
+  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,ulr,image-space-gather \\
+      --variant rt=lightmap-rt,--match-time=report/frames/glossy-probes
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --variant lat-long=glossy-probes,qhmap:--lat-long")]
 pub struct Args {
     /// Mitsuba XML or JSON scene
@@ -265,13 +267,13 @@ fn was_there(figures: &Value) -> bool {
 
 fn method_cost(frames: &Path, probes: Option<&Path>, name: &str, costs: &Costs, scene: &Scene) -> MethodCost {
     let Some(timings) = Timings::read(&frames.join("timings.json")) else { return MethodCost::default() };
+    let frame_ms = frame_ms(&timings.mean_ms);
     let mut passes_ms = timings.mean_ms;
-    // What is no part of rendering a frame.
-    passes_ms.retain(|pass, _| !["load", "aov", "write"].contains(&pass.as_str()));
+    passes_ms.retain(|pass, _| is_rendering(pass));
     let mine = costs.stages.iter().filter(|s| s.methods.iter().any(|m| m == name));
     let precompute_seconds = mine.map(|s| s.seconds).sum::<Option<f64>>().filter(|&s| s > 0.0);
-    let probes = probes.filter(|_| timings.probe_memory_bytes > 0).and_then(|folder| probe_cost(folder, scene));
-    MethodCost { frame_ms: passes_ms.values().sum(), passes_ms, precompute_seconds, probes }
+    let probes = probes.and_then(|folder| probe_cost(folder, scene));
+    MethodCost { frame_ms, passes_ms, precompute_seconds, probes }
 }
 
 /// What a set of probes holds; `None` for a folder of something else.

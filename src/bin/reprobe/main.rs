@@ -2,16 +2,19 @@
 
 mod bake_lightmap;
 mod bake_probes;
+mod budget;
 mod common;
 mod compare;
 mod curvature;
 mod devices;
 mod evaluate;
+mod frames;
 mod info;
 mod pipeline;
 mod place_probes;
 mod probe_set;
 mod qhmap;
+mod render_baseline;
 mod render_glossy;
 mod render_path;
 mod resmap;

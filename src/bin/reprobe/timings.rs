@@ -22,6 +22,12 @@ pub struct Timings {
     pub frames: Vec<FrameTimings>,
     /// Mean of each pass over the frames whose times are known, milliseconds.
     pub mean_ms: BTreeMap<String, f64>,
+    /// Milliseconds a frame: the sum of `mean_ms` but for loading, auxiliary layers and writing. What `--match-time` reads.
+    pub frame_ms: f64,
+    /// Samples of the method (a pixel's paths, rays or taps), given or chosen; `None` for methods without.
+    pub samples: Option<u32>,
+    /// Milliseconds a frame for which `samples` was chosen.
+    pub budget_ms: Option<f64>,
     /// Most memory that probes took at once, bytes; 0 for methods without them.
     pub probe_memory_bytes: u64,
     /// Most memory that the process has held, bytes; `None` where the system does not say.
@@ -67,8 +73,19 @@ impl Timings {
             *count += 1;
         }
         self.mean_ms = sums.into_iter().map(|(pass, (sum, count))| (pass, sum / f64::from(count))).collect();
+        self.frame_ms = frame_ms(&self.mean_ms);
         self.peak_memory_bytes = peak_memory();
     }
+}
+
+/// Milliseconds of a frame's passes, without what is no part of rendering it.
+pub fn frame_ms(passes_ms: &BTreeMap<String, f64>) -> f64 {
+    passes_ms.iter().filter(|(pass, _)| is_rendering(pass)).map(|(_, ms)| ms).sum()
+}
+
+/// Whether a pass is part of rendering a frame.
+pub fn is_rendering(pass: &str) -> bool {
+    !["load", "aov", "write"].contains(&pass)
 }
 
 impl FrameTimings {

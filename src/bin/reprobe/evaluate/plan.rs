@@ -60,7 +60,7 @@ pub fn plan(args: &Args, common: &Common, settings: Settings, variants: &[Varian
         if variant.method.needs_bakes() {
             let bakes = folders(args, variant);
             for (stage, output) in pipeline.bakes(&bakes).into_iter().zip(outputs(&bakes)) {
-                if is_given(args, variant, &bakes, stage.command()) {
+                if is_left_out(args, variant, &bakes, stage.command()) {
                     continue;
                 }
                 match plan.bakes.iter_mut().find(|p| p.output == output) {
@@ -68,13 +68,13 @@ pub fn plan(args: &Args, common: &Common, settings: Settings, variants: &[Varian
                     None => plan.bakes.push(Planned { stage: configure(stage, args, variant), output, users: vec![index] }),
                 }
             }
-            let choice = choice(variant);
-            let known = choices.entry(bakes.probes.clone()).or_default();
-            if !known.contains(&choice) {
+            let (choice, known) = (choice(variant), choices.entry(bakes.probes.clone()).or_default());
+            if variant.method.reads_probes() && !known.contains(&choice) {
                 known.push(choice);
             }
             render = pipeline.render_from(&bakes, &output);
-            probes = Some(variant.option("--probes").map_or(bakes.probes, PathBuf::from));
+            let read = variant.option("--probes").map_or(bakes.probes, PathBuf::from);
+            probes = variant.method.reads_probes().then_some(read);
         }
         render = render.option("--method", variant.method_name());
         render = variant.options.iter().fold(render, |s, (name, value)| s.replace(name, value.as_deref()));
@@ -130,14 +130,14 @@ fn outputs(bakes: &Bakes) -> [PathBuf; 6] {
     [grid, resmap, qhmap, curvature, lightmap, probes]
 }
 
-/// Whether a stage is left out, as the user gave what it would lead to.
-fn is_given(args: &Args, variant: &Variant, bakes: &Bakes, command: &str) -> bool {
+/// Whether a stage is left out, as its method does not need it or the user gave what it would lead to.
+fn is_left_out(args: &Args, variant: &Variant, bakes: &Bakes, command: &str) -> bool {
     let is = |given: &Option<PathBuf>, used: &Path| given.as_deref() == Some(used);
     match command {
         "curvature" => is(&args.curvature, &bakes.curvature),
         "bake-lightmap" => is(&args.lightmap, &bakes.lightmap),
         // What only the probes need.
-        _ => is(&args.probes, &bakes.probes) || variant.option("--probes").is_some(),
+        _ => !variant.method.reads_probes() || is(&args.probes, &bakes.probes) || variant.option("--probes").is_some(),
     }
 }
 
