@@ -238,3 +238,65 @@ fn a_dry_run_prints_the_commands_and_writes_nothing() {
     }
     assert!(lines.len() >= 9 && !f.at("out").exists());
 }
+
+#[test]
+fn every_baseline_writes_the_layers_and_keeps_its_frames() {
+    let f = Folder::new();
+    f.figures(&format!("{RUN} --all-texels --no-reference"));
+    for (method, inputs) in [
+        ("ulr", "--probes out/probes --lightmap out/lightmap.exr --supersample 2"),
+        ("image-space-gather", "--lightmap out/lightmap.exr --samples 20"),
+        ("lightmap-rt", "--lightmap out/lightmap.exr --samples 2 --max-depth 2"),
+        ("path-trace", "--spp 2 --denoise"),
+    ] {
+        let command = format!("render-path scene.xml --path path.json --size 32x18 --method {method} -o {method} {inputs}");
+        let figures = f.figures(&format!("{command} --threads 1"));
+        assert_eq!(figures["method"], method);
+        assert!(figures["frame_ms"].as_f64().unwrap() > 0.0);
+        let before = contents(&f.at(method));
+        let frame = ExrImage::read(&f.at(method).join("0001.exr")).unwrap();
+        let [full, emission, diffuse, glossy] =
+            ["", "emission", "diffuse", "glossy"].map(|l| frame.rgb(Path::new(""), l).unwrap());
+        for i in 0..full.len() {
+            assert_eq!(full[i], emission[i] + diffuse[i] + glossy[i]);
+        }
+        assert!(glossy.iter().any(|c| c.max_element() > 0.0) && diffuse.iter().any(|c| c.max_element() > 0.0), "{method}");
+        assert_eq!(f.figures(&command)["frames"][1]["kept"], true, "{method}");
+        std::fs::remove_file(f.at(method).join("0000.exr")).unwrap();
+        let again = f.figures(&format!("{command} --threads 3"));
+        assert_eq!((&again["frames"][0]["kept"], &again["frames"][1]["kept"]), (&Value::Bool(false), &Value::Bool(true)));
+        assert!(contents(&f.at(method)) == before, "{method}: other bits with other threads");
+        let message = f.refusal(&format!("{command} --device gpu"));
+        assert!(message.contains("--device"), "{message}");
+    }
+}
+
+#[test]
+fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
+    let f = Folder::new();
+    f.figures(&format!("{RUN} --no-reference"));
+    let command = |more: &str| format!("render-path scene.xml --path path.json --size 32x18 {more}");
+    let path_trace = |more: &str| command(&format!("--method path-trace {more}"));
+    let chosen = f.figures(&path_trace("-o a --budget-ms 200"));
+    let spp = chosen["samples"].as_u64().unwrap();
+    assert!(spp > 1 && chosen["budget_ms"] == 200.0, "{chosen}");
+    assert_eq!(f.figures(&path_trace(&format!("-o b --spp {spp}")))["samples"].as_u64(), Some(spp));
+    assert!(contents(&f.at("a")) == contents(&f.at("b")));
+    let lightmap_rt = command("--method lightmap-rt --lightmap out/lightmap.exr -o c");
+    let matched = f.figures(&format!("{lightmap_rt} --match-time a"));
+    assert!(matched["samples"].as_u64().unwrap() >= 1 && matched["budget_ms"].as_f64().unwrap() > 0.0);
+
+    let message = f.refusal(&path_trace("-o d --budget-ms 200 --spp 3"));
+    assert!(message.contains("cannot be used with"), "{message}");
+    assert!(f.refusal(&path_trace("-o d --budget-ms 0")).contains("budget"));
+    assert!(f.refusal(&path_trace("-o d --match-time nowhere")).contains("nowhere"));
+    // Kept frames keep their times; without these, none is known.
+    f.figures(&path_trace(&format!("-o b --spp {spp}")));
+    assert!(f.figures(&path_trace("-o d --match-time b"))["budget_ms"].as_f64().unwrap() > 0.0);
+    std::fs::remove_file(f.at("b/timings.json")).unwrap();
+    f.figures(&path_trace(&format!("-o b --spp {spp}")));
+    assert!(f.refusal(&path_trace("-o d --match-time b")).contains("render them again"));
+    let ulr = command("--method ulr --probes out/probes -o d --budget-ms 200");
+    assert!(f.refusal(&ulr).contains("no sample count"));
+    assert!(f.refusal(&path_trace("-o d --denoise --layers full")).contains("--layers full"));
+}

@@ -8,9 +8,10 @@ use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
 use crate::Result;
 use crate::math::Rgb;
 use crate::progress::Progress;
-use crate::render::path_trace::{LayerImages, PathTraceParams};
+use crate::render::path_trace::LayerImages;
 use crate::scene::Camera;
 use crate::transport::bsdf::{Lobes, Query};
+use crate::transport::path::PathParams;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
@@ -46,12 +47,11 @@ pub struct PathTracer {
     add: Kernel,
     /// One for each quantity but the emission: the halves of the first vertex, or the whole.
     paths: Vec<Follow>,
-    params: PathTraceParams,
 }
 
 impl PathTracer {
     /// Compiles it, for the layers or for the full image alone.
-    pub fn new(scene: Arc<GpuScene>, params: &PathTraceParams, layers: bool) -> Result<Self> {
+    pub fn new(scene: Arc<GpuScene>, path: &PathParams, layers: bool) -> Result<Self> {
         let source = [
             RAYS,
             MATERIALS,
@@ -65,10 +65,10 @@ impl PathTracer {
         let add = Kernel::new(&scene.gpu, include_str!("../../shaders/add_samples.wgsl"), "add_samples")?;
         // After the set that the camera ray has drawn.
         let place = Place { branch: None, first_set: 1 };
-        let whole = Follow::new(scene.clone(), &params.path, Purpose::Scattering(Query::default()), place)?;
+        let whole = Follow::new(scene.clone(), path, Purpose::Scattering(Query::default()), place)?;
         let half = |lobes, k| whole.half(lobes, Place { branch: Some(k), first_set: 0 });
         let paths = if layers { vec![half(Lobes::DIFFUSE, 0), half(Lobes::NON_DIFFUSE, 1)] } else { vec![whole] };
-        Ok(Self { scene, hits, add, paths, params: *params })
+        Ok(Self { scene, hits, add, paths })
     }
 
     /// The device's name.
@@ -77,22 +77,22 @@ impl PathTracer {
     }
 
     /// The full image, as [`crate::render::path_trace::path_trace_full`] renders it.
-    pub fn full(&self, camera: &Camera, seed: u32, frame: u32, progress: &dyn Progress) -> Result<Vec<Rgb>> {
-        let means = self.means(camera, [seed, frame], progress)?;
+    pub fn full(&self, camera: &Camera, spp: u32, seed: u32, frame: u32, progress: &dyn Progress) -> Result<Vec<Rgb>> {
+        let means = self.means(camera, spp, [seed, frame], progress)?;
         Ok(means.chunks_exact(2).map(|p| p[0] + p[1]).collect())
     }
 
     /// The layers, as [`crate::render::path_trace::path_trace`] renders them.
-    pub fn layers(&self, camera: &Camera, seed: u32, frame: u32, progress: &dyn Progress) -> Result<LayerImages> {
-        let means = self.means(camera, [seed, frame], progress)?;
+    pub fn layers(&self, camera: &Camera, spp: u32, seed: u32, frame: u32, progress: &dyn Progress) -> Result<LayerImages> {
+        let means = self.means(camera, spp, [seed, frame], progress)?;
         let layer = |k: usize| means.iter().skip(k).step_by(3).copied().collect();
         Ok(LayerImages { emission: layer(0), diffuse: layer(1), glossy: layer(2) })
     }
 
     /// Emission and what each of the paths carries, one after the other for every pixel.
-    fn means(&self, camera: &Camera, [seed, frame]: [u32; 2], progress: &dyn Progress) -> Result<Vec<Rgb>> {
+    fn means(&self, camera: &Camera, spp: u32, [seed, frame]: [u32; 2], progress: &dyn Progress) -> Result<Vec<Rgb>> {
         let gpu = &self.scene.gpu;
-        let (pixels, spp) = ((camera.size[0] * camera.size[1]) as usize, self.params.spp);
+        let pixels = (camera.size[0] * camera.size[1]) as usize;
         let quantities = self.paths.len() + 1;
         let sums = gpu.output("the frame", (pixels * quantities * size_of::<SampleSum>()) as u64)?;
         let most = most_starts(&self.scene);

@@ -3,10 +3,12 @@
 //! The display metrics work on what a screen would show: linear radiance times 2^exposure, clamped to [0, 1] and sRGB-encoded
 //! ([`display`]). The linear ones work on radiance as it is.
 
+pub mod evaluation;
 pub mod flip;
 pub mod report;
 pub mod rmse;
 pub mod ssim;
+pub mod temporal;
 
 use crate::math::Rgb;
 use rayon::prelude::*;

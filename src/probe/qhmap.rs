@@ -30,11 +30,19 @@ pub struct QhmapParams {
     /// Added to m, in units of its mean: bounds how far directions without need are compressed, and keeps the system
     /// regular where m is 0. *Ours*.
     pub epsilon: f32,
+    /// Plain lat-long, whatever the resolution map asks for (Fig. 12).
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub lat_long: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_false(b: &bool) -> bool {
+    !b
 }
 
 impl Default for QhmapParams {
     fn default() -> Self {
-        Self { size: [1024, 512], epsilon: 0.01 }
+        Self { size: [1024, 512], epsilon: 0.01, lat_long: false }
     }
 }
 
@@ -54,6 +62,9 @@ impl QhmapParams {
 
 /// The parameterisation for a resolution map `m` of the solver's size, and the epsilon that it took. `params` are valid.
 pub fn parameter_map(solver: &mut Solver, m: &[f32], params: &QhmapParams) -> Result<(ParameterMap, f32)> {
+    if params.lat_long {
+        return Ok((ParameterMap::identity(params.size), params.epsilon));
+    }
     let forward = solver.forward_map(m, params.epsilon)?;
     Ok((ParameterMap::from_forward(solver.mesh(), forward.vertices, params.size), forward.epsilon))
 }

@@ -47,6 +47,11 @@ fn lookup_previous(previous: &Previous, camera: &Camera, p: glam::Vec3, material
     same.then(|| previous.glossy[i])
 }
 
+/// The emission layer: LE, emission seen directly, and the environment.
+pub fn emission_layer(view: &GBuffer) -> Vec<Rgb> {
+    view.pixels.par_iter().zip(&view.background).map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission)).collect()
+}
+
 /// The diffuse layer: the light map's E times the view's factor of the diffuse lobe, `diffuse_out(ω) E / π`.
 pub fn diffuse_layer(scene: &Scene, view: &GBuffer, lightmap: &LightMap) -> Vec<Rgb> {
     let radiance = |p: &Pixel| lightmap.diffuse_radiance(scene, &p.surface, p.wo);

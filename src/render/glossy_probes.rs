@@ -1,7 +1,7 @@
 //! One frame by glossy probe reprojection: the method's table of contents (§5, §6).
 
 use super::candidates::NearCandidates;
-use super::composite::{Previous, diffuse_layer, downsample, reproject_previous};
+use super::composite::{Previous, diffuse_layer, downsample, emission_layer, reproject_previous};
 use super::coverage::{CoverageParams, SubPixels, covered_pixels};
 use super::filter::{FilterInput, FilterParams, NOT_GLOSSY, filter};
 use super::footprint::{Footprint, FootprintParams, GlossyPoint};
@@ -166,8 +166,7 @@ impl<'a> Renderer<'a> {
             Some(map) => diffuse_layer(&self.world.scene, &view, map),
             None => vec![Rgb::ZERO; glossy.len()],
         };
-        let emission: Vec<Rgb> =
-            view.pixels.par_iter().zip(&view.background).map(|(p, &sky)| p.as_ref().map_or(sky, |p| p.emission)).collect();
+        let emission = emission_layer(&view);
         let mut layers = [&emission, &diffuse, &glossy].map(|layer| downsample(layer, size, n as usize));
         clock.lap("composite");
         let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };

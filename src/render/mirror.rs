@@ -64,15 +64,20 @@ pub fn mirror_pass(world: &World, view: &GBuffer) -> Vec<Reflected> {
         .collect()
 }
 
-/// Traces the mirror ray of `surface` for a viewer at direction `wo`.
-pub fn mirror_hit(world: &World, surface: &Surface, wo: Vec3) -> Reflected {
+/// Unit direction in which `surface`, as a mirror, sends the view from `wo` (unit, away from the surface) on.
+pub fn mirror_direction(surface: &Surface, wo: Vec3) -> Vec3 {
     let ng = if surface.ng.dot(wo) < 0.0 { -surface.ng } else { surface.ng };
     let mut d = reflect(wo, facing_normal(surface, wo));
     if d.dot(ng) <= 0.0 {
         // The interpolated normal bends the ray into the surface.
         d = reflect(wo, ng);
     }
-    let d = d.try_normalize().unwrap_or(ng);
+    d.try_normalize().unwrap_or(ng)
+}
+
+/// Traces the mirror ray of `surface` for a viewer at direction `wo`.
+pub fn mirror_hit(world: &World, surface: &Surface, wo: Vec3) -> Reflected {
+    let d = mirror_direction(surface, wo);
     match world.closest(&surface.spawn(d)) {
         Some(hit) => {
             let geometry = &world.scene.geometry;

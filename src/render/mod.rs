@@ -2,6 +2,7 @@
 //! and the other methods that the same frames can be rendered by.
 
 pub mod aov;
+pub mod baseline;
 pub mod candidates;
 pub mod composite;
 pub mod coverage;

@@ -63,7 +63,7 @@ pub fn curvature(geometry: &Geometry, params: &CurvatureParams, progress: &dyn P
         .collect();
     progress.finish();
     let count = geometry.positions.len();
-    let mut map = CurvatureMap { k1: vec![0.0; count], k2: vec![0.0; count], d1: vec![Vec3::X; count] };
+    let mut map = CurvatureMap::flat(count);
     for (object, values) in geometry.objects.iter().zip(objects) {
         for (i, c) in object.vertices.clone().zip(values) {
             let i = i as usize;
@@ -142,6 +142,11 @@ fn regularize(mesh: &WeldedMesh, rings: &Rings, raw: &[Option<Curvature>], v: u3
 }
 
 impl CurvatureMap {
+    /// No curvature at any of a scene's `count` vertices: for methods that do not ask for it.
+    pub fn flat(count: usize) -> Self {
+        Self { k1: vec![0.0; count], k2: vec![0.0; count], d1: vec![Vec3::X; count] }
+    }
+
     /// Curvature at the point of `triangle` with the weights `barycentric` of its second and third vertex, relative to the unit
     /// shading normal `normal` there: where that was turned to face the viewer, against the vertex normals, the signs turn too.
     /// Interpolates the tensor, not the directions, which may jump.

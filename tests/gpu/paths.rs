@@ -39,11 +39,11 @@ fn layers_and_full_images_are_the_cpus() {
     let camera = Camera { size: [48, 27], ..world.scene.sensor.clone().unwrap() };
     let params = PathTraceParams { spp: 8, ..PathTraceParams::default() };
     let scene = Arc::new(GpuScene::new(gpu, &world).unwrap());
-    let tracer = PathTracer::new(scene.clone(), &params, true).unwrap();
+    let tracer = PathTracer::new(scene.clone(), &params.path, true).unwrap();
     let cpu = path_trace(&world, &camera, &params, 3, 5, &Silent);
-    check("room", &tracer.layers(&camera, 3, 5, &Silent).unwrap(), &cpu, 0.01);
+    check("room", &tracer.layers(&camera, params.spp, 3, 5, &Silent).unwrap(), &cpu, 0.01);
     let short = PathTraceParams { path: PathParams { max_depth: 2, rr_depth: 1 }, ..params };
-    let full = PathTracer::new(scene, &short, false).unwrap().full(&camera, 3, 5, &Silent).unwrap();
+    let full = PathTracer::new(scene, &short.path, false).unwrap().full(&camera, short.spp, 3, 5, &Silent).unwrap();
     let (apart, mean) = difference(&full, &path_trace_full(&world, &camera, &short, 3, 5, &Silent));
     assert!(apart < 0.01 && mean < 2e-3, "full image: {apart} of the pixels, means by {mean}");
 }
@@ -122,7 +122,7 @@ fn every_model_and_emitter_is_the_cpus() {
     let camera = world.scene.sensor.clone().unwrap();
     let params = PathTraceParams { spp: 8, ..PathTraceParams::default() };
     let scene = Arc::new(GpuScene::new(gpu, &world).unwrap());
-    let gpu = PathTracer::new(scene, &params, true).unwrap().layers(&camera, 1, 0, &Silent).unwrap();
+    let gpu = PathTracer::new(scene, &params.path, true).unwrap().layers(&camera, params.spp, 1, 0, &Silent).unwrap();
     check("zoo", &gpu, &path_trace(&world, &camera, &params, 1, 0, &Silent), 0.05);
 }
 

@@ -1,7 +1,7 @@
 //! `reprobe bake-probes`.
 
 use crate::common::{Common, Outcome, Shard, parse_shard, parse_size};
-use crate::set_params::apply;
+use crate::set_params::{apply, split};
 use crate::views::{FrameList, parse_frames, views};
 use anyhow::{Context, bail};
 use reprobe::gpu::{GpuScene, ProbePaths};
@@ -85,6 +85,10 @@ pub struct Args {
     /// Choose texels with this parameter of the gather, as render-path's --set, for --for-path
     #[arg(long = "set", value_name = "NAME=VALUE")]
     set: Vec<String>,
+    /// Also bake the texels of another choice, with these parameters of the gather, for --for-path; `paper` for those of
+    /// --paper; may be repeated
+    #[arg(long, value_name = "[paper,]NAME=VALUE,...", requires = "for_path")]
+    alternative: Vec<String>,
 }
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
@@ -112,12 +116,19 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
 
     let params = BakeParams { spp: args.spp, error: args.error, roughness_scale: args.roughness_scale, spread: args.spread };
     let progress = common.progress();
-    let gather = apply(&if args.paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() }, &args.set)?.gather;
+    let passes = |paper: bool| if paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() };
+    let gather = apply(&passes(args.paper), &args.set)?.gather;
     let for_path = match &args.for_path {
         Some(path) => {
             let views = views(common, scene, Some(path), args.size, args.frames.as_ref())?;
             let cameras: Vec<_> = views.into_iter().map(|v| v.camera).collect();
-            Some((Views::new(&cameras, args.supersample, &gather), cameras))
+            let mut views = Views::new(&cameras, args.supersample, &gather);
+            for alternative in &args.alternative {
+                let (mut parts, all) = (split(alternative), split(alternative).len());
+                parts.retain(|part| part != "paper");
+                views = views.or(&apply(&passes(args.paper || parts.len() < all), &parts)?.gather);
+            }
+            Some((views, cameras))
         }
         None => None,
     };

@@ -108,7 +108,18 @@ fn threshold(text: &str) -> Result<f64, String> {
 /// Reads, measures and draws one frame.
 fn compare_frame(args: &Args, index: usize, pair: &Pair) -> anyhow::Result<(FrameMetrics, [String; 2])> {
     let [fa, fb] = &pair.files;
-    let layer = if args.layer == "full" { "" } else { &args.layer };
+    let [a, b] = read_pair(fa, fb, &args.layer)?;
+    let comparison = compare(&a, &b, args.exposure);
+    for picture in Picture::ALL {
+        atomic::write(&args.output.join(picture.path(index)), &picture.png(&comparison)?)?;
+    }
+    let hashes = [reprobe::io::provenance::hash_file(fa)?, reprobe::io::provenance::hash_file(fb)?];
+    Ok((FrameMetrics { name: pair.name.clone(), metrics: comparison.metrics }, hashes))
+}
+
+/// One layer (`full` for the image itself) of a frame and of its reference, fit to be compared.
+pub fn read_pair(fa: &Path, fb: &Path, layer: &str) -> anyhow::Result<[Raster; 2]> {
+    let layer = if layer == "full" { "" } else { layer };
     let (a, b) = (read(fa, layer)?, read(fb, layer)?);
     if a.size != b.size {
         let [(wa, ha), (wb, hb)] = [(a.size[0], a.size[1]), (b.size[0], b.size[1])];
@@ -118,12 +129,7 @@ fn compare_frame(args: &Args, index: usize, pair: &Pair) -> anyhow::Result<(Fram
         let n = ssim::WINDOW;
         bail!("{}: found {} x {} pixels, expected at least {n} x {n}: the window of SSIM", fa.display(), a.size[0], a.size[1]);
     }
-    let comparison = compare(&a, &b, args.exposure);
-    for picture in Picture::ALL {
-        atomic::write(&args.output.join(picture.path(index)), &picture.png(&comparison)?)?;
-    }
-    let hashes = [reprobe::io::provenance::hash_file(fa)?, reprobe::io::provenance::hash_file(fb)?];
-    Ok((FrameMetrics { name: pair.name.clone(), metrics: comparison.metrics }, hashes))
+    Ok([a, b])
 }
 
 fn read(path: &Path, layer: &str) -> anyhow::Result<Raster> {

@@ -2,14 +2,19 @@
 
 mod bake_lightmap;
 mod bake_probes;
+mod budget;
 mod common;
 mod compare;
 mod curvature;
 mod devices;
+mod evaluate;
+mod frames;
 mod info;
+mod pipeline;
 mod place_probes;
 mod probe_set;
 mod qhmap;
+mod render_baseline;
 mod render_glossy;
 mod render_path;
 mod resmap;
@@ -45,6 +50,7 @@ enum Command {
     Devices(devices::Args),
     Info(info::Args),
     Run(run::Args),
+    Evaluate(evaluate::Args),
 }
 
 fn main() -> ExitCode {
@@ -80,5 +86,6 @@ fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
         Command::Devices(args) => devices::run(args, common),
         Command::Info(args) => info::run(args, common),
         Command::Run(args) => run::run(args, common),
+        Command::Evaluate(args) => evaluate::run(args, common),
     }
 }

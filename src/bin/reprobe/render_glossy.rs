@@ -87,7 +87,7 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
             Some(mut renderer) => {
                 renderer.inspect = inspect;
                 timings.device = Some(renderer.device().to_owned());
-                timings.clock = if renderer.has_clock() { "gpu" } else { "cpu" };
+                timings.clock = if renderer.has_clock() { "gpu" } else { "cpu" }.into();
                 Engine::Gpu(Box::new(renderer))
             }
             None => {

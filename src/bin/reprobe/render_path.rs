@@ -1,15 +1,17 @@
 //! `reprobe render-path`.
 
 use crate::common::{Common, Outcome, parse_bytes, parse_size};
-use crate::render_glossy;
+use crate::frames::{self, with_layers};
+use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
 use crate::views::{FrameList, View, parse_frames, views};
+use crate::{render_baseline, render_glossy};
 use anyhow::bail;
 use clap::ValueEnum;
 use reprobe::gpu::{GpuScene, PathTracer};
 use reprobe::io::{ExrImage, Provenance, atomic};
 use reprobe::progress::Progress;
-use reprobe::render::aov::with_first_hits;
+use reprobe::render::baseline::denoise::{DenoiseParams, denoise, guides};
 use reprobe::render::path_trace::{PathTraceParams, path_trace, path_trace_full};
 use reprobe::scene::{Camera, Scene};
 use reprobe::transport::World;
@@ -39,9 +41,21 @@ pub struct Args {
     /// Samples a pixel of path-trace
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: u32,
-    /// Most scattering vertices of a path [default: unbounded]
+    /// Samples a pixel of lightmap-rt (glossy rays at the first vertex, default 4) or image-space-gather (taps, default 64)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub samples: Option<u32>,
+    /// Most scattering vertices of a path [default: unbounded; lightmap-rt: 3]
     #[arg(long, value_name = "N")]
-    max_depth: Option<u32>,
+    pub max_depth: Option<u32>,
+    /// path-trace: filter the layers, guided by albedo, normal and depth
+    #[arg(long)]
+    denoise: bool,
+    /// Choose the samples (--spp, --samples) with which a frame takes about so long, milliseconds
+    #[arg(long, value_name = "MS", conflicts_with_all = ["spp", "samples"])]
+    pub budget_ms: Option<f64>,
+    /// Choose the samples with which a frame takes about as long as those in this folder, by its timings.json
+    #[arg(long, value_name = "FRAMES", conflicts_with_all = ["spp", "samples", "budget_ms"])]
+    pub match_time: Option<PathBuf>,
     /// Auxiliary layers: the first hit's, and the buffers of glossy-probes' passes
     #[arg(long, value_enum, value_name = "LAYERS")]
     pub aov: Option<Aov>,
@@ -51,16 +65,16 @@ pub struct Args {
     /// Only these frames of the path
     #[arg(long, value_name = "LIST", value_parser = parse_frames)]
     frames: Option<FrameList>,
-    /// glossy-probes: the baked probes
+    /// glossy-probes, ulr: the baked probes
     #[arg(long, value_name = "DIR")]
     pub probes: Option<PathBuf>,
-    /// glossy-probes: the diffuse light
+    /// The diffuse light, for all methods but path-trace
     #[arg(long, value_name = "FILE.exr")]
     pub lightmap: Option<PathBuf>,
     /// glossy-probes: curvatures of the scene
     #[arg(long, value_name = "FILE.exr")]
     pub curvature: Option<PathBuf>,
-    /// glossy-probes: N x N rays a pixel through all passes
+    /// N x N rays a pixel through all passes, for all methods but path-trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub supersample: u32,
     /// glossy-probes: memory that a GPU may be filled with, like 512M or 2G; probes past it are uploaded again
@@ -69,17 +83,41 @@ pub struct Args {
     /// glossy-probes: the paper's text in every choice
     #[arg(long)]
     pub paper: bool,
-    /// glossy-probes: set a parameter of a pass, like gather.falloff=4; a wrong name lists them all
+    /// Set a parameter of the method (path-trace: of its denoiser), like gather.falloff=4; a wrong name lists them all
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Method {
+/// How frames are rendered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Method {
     /// Glossy probes, reprojected
     GlossyProbes,
     /// The reference: path tracing
     PathTrace,
+    /// Baseline: unstructured lumigraph of the same probes
+    Ulr,
+    /// Baseline: mirror reflections of the light map, blurred in image space
+    ImageSpaceGather,
+    /// Baseline: light map, and rays along the glossy lobes
+    LightmapRt,
+}
+
+impl Method {
+    /// Whether it reads what other stages have baked.
+    pub fn needs_bakes(self) -> bool {
+        self != Self::PathTrace
+    }
+
+    /// Whether probes are among them.
+    pub fn reads_probes(self) -> bool {
+        matches!(self, Self::GlossyProbes | Self::Ulr)
+    }
+
+    /// Whether it reads other texels of them than `bake-probes --for-path` chooses.
+    pub fn reads_any_texel(self) -> bool {
+        self == Self::Ulr
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -101,12 +139,15 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let timings = Timings {
         method: args.method.to_possible_value().map_or_else(String::new, |v| v.get_name().into()),
         threads: rayon::current_num_threads(),
-        clock: "cpu",
+        clock: "cpu".into(),
         ..Timings::default()
     };
     match args.method {
         Method::GlossyProbes => render_glossy::run(args, common, timings),
         Method::PathTrace => run_path_trace(args, common, timings),
+        Method::Ulr => render_baseline::run_ulr(args, common, timings),
+        Method::ImageSpaceGather => render_baseline::run_image_space_gather(args, common, timings),
+        Method::LightmapRt => render_baseline::run_lightmap_rt(args, common, timings),
     }
 }
 
@@ -116,10 +157,11 @@ pub fn views_of(args: &Args, common: &Common, scene: &Scene) -> anyhow::Result<V
 }
 
 fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
-    let params = PathTraceParams {
-        spp: args.spp,
-        path: PathParams { max_depth: args.max_depth.unwrap_or(u32::MAX), ..PathParams::default() },
-    };
+    let path = PathParams { max_depth: args.max_depth.unwrap_or(u32::MAX), ..PathParams::default() };
+    let denoiser = args.denoise.then(|| apply(&DenoiseParams::default(), &args.set)).transpose()?;
+    if args.denoise && args.layers == LayerChoice::Full {
+        bail!("--denoise filters layer by layer: leave --layers full out");
+    }
     let (scene, load_ms) = timed(|| common.load_scene(&args.scene));
     let scene = scene?;
     if scene.emitters.is_empty() {
@@ -130,56 +172,42 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
     (timings.load_ms, timings.build_ms) = (load_ms, build_ms);
 
     let tracer =
-        common.on_gpu(|gpu| PathTracer::new(Arc::new(GpuScene::new(gpu, &world)?), &params, args.layers == LayerChoice::All))?;
+        common.on_gpu(|gpu| PathTracer::new(Arc::new(GpuScene::new(gpu, &world)?), &path, args.layers == LayerChoice::All))?;
     timings.device = tracer.as_ref().map(|t| t.device().to_owned());
-    let bar = common.progress();
-    bar.start("path-trace", views.iter().map(|v| u64::from(v.camera.size[1])).sum());
-    for View { frame, camera } in &views {
-        let mut times = FrameTimings { name: format!("{frame:04}.exr"), ..FrameTimings::default() };
-        let path = args.output.join(&times.name);
-        let parameters = json!({
-            "method": timings.method, "frame": frame, "path_trace": params, "layers": args.layers, "aov": args.aov.is_some(), "camera": describe(camera),
-        });
-        let provenance = Provenance::new("render-path", &world.scene.hash, common.seed, &parameters);
-        if is_finished(&path, &provenance) {
-            times.kept = true;
-            bar.advance(u64::from(camera.size[1]));
-        } else {
-            let image = ExrImage::new(camera.size[0] as usize, camera.size[1] as usize).with_provenance(provenance);
-            let mut image = times.pass("path_trace", || match args.layers {
-                LayerChoice::Full => {
-                    let full = match &tracer {
-                        Some(tracer) => tracer.full(camera, common.seed, *frame, &bar)?,
-                        None => path_trace_full(&world, camera, &params, common.seed, *frame, &bar),
-                    };
-                    anyhow::Ok(image.with_rgb("", &full))
-                }
-                LayerChoice::All => {
-                    let layers = match &tracer {
-                        Some(tracer) => tracer.layers(camera, common.seed, *frame, &bar)?,
-                        None => path_trace(&world, camera, &params, common.seed, *frame, &bar),
-                    };
-                    Ok(image
-                        .with_rgb("", &layers.full())
-                        .with_rgb("emission", &layers.emission)
-                        .with_rgb("diffuse", &layers.diffuse)
-                        .with_rgb("glossy", &layers.glossy))
-                }
+    let parameters = |spp| match &denoiser {
+        None => json!({ "path_trace": PathTraceParams { spp, path }, "layers": args.layers }),
+        Some(d) => json!({ "path_trace": PathTraceParams { spp, path }, "layers": args.layers, "denoise": d }),
+    };
+    let seed = common.seed;
+    let mut render = |view: &View, spp: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {
+        let View { frame, camera } = view;
+        let params = PathTraceParams { spp, path };
+        if args.layers == LayerChoice::Full {
+            let full = times.pass("path_trace", || match &tracer {
+                Some(tracer) => tracer.full(camera, spp, seed, *frame, bar),
+                None => Ok(path_trace_full(&world, camera, &params, seed, *frame, bar)),
             })?;
-            if args.aov.is_some() {
-                image = times.pass("aov", || with_first_hits(image, &world, camera));
-            }
-            times.pass("write", || image.write(&path))?;
+            return Ok(image.with_rgb("", &full));
         }
-        timings.frames.push(times);
-    }
-    bar.finish();
-    finish(timings, &args.output)
+        let mut layers = times.pass("path_trace", || match &tracer {
+            Some(tracer) => tracer.layers(camera, spp, seed, *frame, bar),
+            None => Ok(path_trace(&world, camera, &params, seed, *frame, bar)),
+        })?;
+        if let Some(d) = &denoiser {
+            let guides = times.pass("guides", || guides(&world, camera, d, spp, seed, *frame));
+            layers = times.pass("denoise", || denoise(&layers, &guides, camera.size[0] as usize, d));
+        }
+        Ok(with_layers(image, &layers))
+    };
+    let provenance = Provenance::new("render-path", &world.scene.hash, seed, &json!({}));
+    let method =
+        frames::Method { world: &world, provenance, samples: Some(args.spp), parameters: &parameters, render: &mut render };
+    frames::render(args, common, timings, &views, method)
 }
 
 /// Writes `timings.json` and sums up the run.
 pub fn finish(mut timings: Timings, output: &Path) -> anyhow::Result<Outcome> {
-    timings.finish();
+    timings.finish(&output.join("timings.json"));
     atomic::write_json(&output.join("timings.json"), &timings)?;
     let kept = timings.frames.iter().filter(|f| f.kept).count();
     let count = timings.frames.len();

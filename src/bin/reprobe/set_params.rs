@@ -20,6 +20,20 @@ pub fn apply<T: Serialize + DeserializeOwned>(params: &T, sets: &[String]) -> an
     Ok(serde_json::from_value(tree)?)
 }
 
+/// The parts of a list with commas between them; commas within brackets are JSON's.
+pub fn split(text: &str) -> Vec<String> {
+    let mut depth = 0usize;
+    let parts = text.split(|c| {
+        depth = match c {
+            '[' | '{' => depth + 1,
+            ']' | '}' => depth.saturating_sub(1),
+            _ => depth,
+        };
+        c == ',' && depth == 0
+    });
+    parts.filter(|part| !part.is_empty()).map(str::to_owned).collect()
+}
+
 fn find<'a>(tree: &'a mut Value, name: &str) -> Option<&'a mut Value> {
     name.split('.').try_fold(tree, |node, key| match node {
         Value::Object(fields) => fields.get_mut(key),
@@ -50,6 +64,15 @@ fn walk(prefix: &str, node: &Value, lines: &mut Vec<String>) {
 mod tests {
     use super::*;
     use reprobe::render::glossy_probes::GlossyProbeParams;
+
+    #[test]
+    fn lists_are_split_outside_of_brackets() {
+        let search = r#"gather.search=[{"radius":1,"step":4},{"radius":1,"step":2}]"#;
+        let parts = split(&format!("gather.probes=1,{search}"));
+        assert_eq!(parts, ["gather.probes=1", search]);
+        assert_eq!(apply(&GlossyProbeParams::default(), &parts).unwrap().gather.search.len(), 2);
+        assert!(split("").is_empty());
+    }
 
     #[test]
     fn fields_are_set_by_name_and_wrong_names_list_the_right_ones() {

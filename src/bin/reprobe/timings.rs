@@ -1,11 +1,12 @@
 //! `timings.json`: milliseconds a pass and frame, and memory. Kept apart from the frames, whose bits must not depend on it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// What a run took.
-#[derive(Serialize, Default)]
+#[derive(Serialize, Deserialize, Default)]
 pub struct Timings {
     /// `--method`.
     pub method: String,
@@ -14,15 +15,21 @@ pub struct Timings {
     /// The GPU that frames were made on; `None` for the CPU.
     pub device: Option<String>,
     /// Whose clock the passes on the GPU were timed by: "gpu", or "cpu" for the host's, which includes handing them over.
-    pub clock: &'static str,
+    pub clock: String,
     /// Scene loading, milliseconds.
     pub load_ms: f64,
     /// Acceleration structures, milliseconds.
     pub build_ms: f64,
     /// Frames in order.
     pub frames: Vec<FrameTimings>,
-    /// Mean of each pass over the frames rendered in this run, milliseconds.
+    /// Mean of each pass over the frames whose times are known, milliseconds.
     pub mean_ms: BTreeMap<String, f64>,
+    /// Milliseconds a frame: the sum of `mean_ms` but for loading, auxiliary layers and writing. What `--match-time` reads.
+    pub frame_ms: f64,
+    /// Samples of the method (a pixel's paths, rays or taps), given or chosen; `None` for methods without.
+    pub samples: Option<u32>,
+    /// Milliseconds a frame for which `samples` was chosen.
+    pub budget_ms: Option<f64>,
     /// Most memory that probes took at once, bytes; 0 for methods without them.
     pub probe_memory_bytes: u64,
     /// Most memory that probes took at once on the GPU, bytes.
@@ -32,7 +39,7 @@ pub struct Timings {
 }
 
 /// What a frame took.
-#[derive(Serialize, Default)]
+#[derive(Serialize, Deserialize, Default)]
 pub struct FrameTimings {
     /// File name.
     pub name: String,
@@ -40,13 +47,29 @@ pub struct FrameTimings {
     pub kept: bool,
     /// Share of sub-pixels that neither a probe nor the frame before served; `None` for methods without probes.
     pub unserved_fraction: Option<f64>,
-    /// Milliseconds of each pass.
+    /// Milliseconds of each pass, in the run that rendered the frame.
     pub passes_ms: BTreeMap<String, f64>,
 }
 
 impl Timings {
-    /// Fills in the means and the memory.
-    pub fn finish(&mut self) {
+    /// Reads what [`Timings::finish`] led to; `None` where there is no such file.
+    pub fn read(path: &Path) -> Option<Self> {
+        serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()
+    }
+
+    /// Fills in the means and the memory; frames that were kept have the times that the `earlier` file tells of them.
+    pub fn finish(&mut self, earlier: &Path) {
+        let written = |path: &Path| path.metadata().and_then(|m| m.modified()).ok();
+        if let Some(found) = self.frames.iter().any(|f| f.kept).then(|| Self::read(earlier)).flatten() {
+            self.probe_memory_bytes = self.probe_memory_bytes.max(found.probe_memory_bytes);
+            for before in found.frames {
+                // A frame newer than the file is of a run that was stopped before it could write its times.
+                let known = written(&earlier.with_file_name(&before.name)) <= written(earlier);
+                if let Some(frame) = self.frames.iter_mut().find(|f| known && f.kept && f.name == before.name) {
+                    *frame = FrameTimings { kept: true, ..before };
+                }
+            }
+        }
         let mut sums = BTreeMap::<String, (f64, u32)>::new();
         for (pass, ms) in self.frames.iter().flat_map(|f| &f.passes_ms) {
             let (sum, count) = sums.entry(pass.clone()).or_default();
@@ -54,8 +77,19 @@ impl Timings {
             *count += 1;
         }
         self.mean_ms = sums.into_iter().map(|(pass, (sum, count))| (pass, sum / f64::from(count))).collect();
+        self.frame_ms = frame_ms(&self.mean_ms);
         self.peak_memory_bytes = peak_memory();
     }
+}
+
+/// Milliseconds of a frame's passes, without what is no part of rendering it.
+pub fn frame_ms(passes_ms: &BTreeMap<String, f64>) -> f64 {
+    passes_ms.iter().filter(|(pass, _)| is_rendering(pass)).map(|(_, ms)| ms).sum()
+}
+
+/// Whether a pass is part of rendering a frame.
+pub fn is_rendering(pass: &str) -> bool {
+    !["load", "aov", "write"].contains(&pass)
 }
 
 impl FrameTimings {

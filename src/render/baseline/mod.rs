@@ -1,0 +1,29 @@
+//! The methods that the paper compares itself with (§7.3), one file each, as strong as their sources let them be.
+//!
+//! All take the G-buffer of a view and return its glossy layer, at the view's size; emission and diffuse layers are those of
+//! [`super::composite`]. Path tracing has a file of its own ([`super::path_trace`]); here is its denoiser.
+
+pub mod denoise;
+pub mod image_space_gather;
+pub mod lightmap_rt;
+pub mod ulr;
+
+use super::gbuffer::Pixel;
+use crate::math::Rgb;
+use crate::scene::Scene;
+use crate::transport::Surface;
+use crate::transport::bsdf::{Lobes, Query};
+use glam::Vec3;
+
+/// The lobes that make the glossy layer, at the material's own roughness.
+const GLOSSY: Query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: 1.0 };
+
+/// Directional albedo of a surface's non-diffuse lobes towards `wo` (unit, world, away from it).
+fn glossy_albedo(scene: &Scene, surface: &Surface, wo: Vec3) -> Rgb {
+    scene.materials[surface.material as usize].bsdf.glossy_albedo(surface, surface.frame.to_local(wo), GLOSSY)
+}
+
+/// Pixels that have a glossy layer at all.
+fn glossy(pixel: &Option<Pixel>) -> Option<&Pixel> {
+    pixel.as_ref().filter(|p| p.alpha.is_some())
+}
