@@ -33,7 +33,7 @@ fn line(a: &Adapter) -> String {
     let kind = if a.is_gpu { "gpu" } else { "software adapter, by name only" };
     let clock = if a.timestamps { "timestamps" } else { "no timestamps" };
     format!(
-        "gpu:\"{}\": {kind}; {}, {}; buffers of {} MiB, {clock}; resmap, render-path (glossy-probes)",
+        "gpu:\"{}\": {kind}; {}, {}; buffers of {} MiB, {clock}; resmap, bake-probes, bake-lightmap, render-path",
         a.name,
         a.backend,
         a.driver,
