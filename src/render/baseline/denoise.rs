@@ -37,7 +37,7 @@ pub struct DenoiseParams {
     pub levels: u32,
     /// Standard deviations of noise that two pixels may differ by.
     pub luminance_sigma: f32,
-    /// Exponent of the cosine between normals.
+    /// How fast a pixel's weight falls with the angle between normals: exp(-power (1 - cos)), close to a power of the cosine.
     pub normal_power: f32,
     /// Depth that two pixels may differ by, in units of what the surface's slope explains.
     pub depth_sigma: f32,
@@ -54,11 +54,11 @@ impl Default for DenoiseParams {
         Self {
             levels: 5,
             luminance_sigma: 4.0,
-            normal_power: 64.0,
+            normal_power: 16.0,
             depth_sigma: 1.0,
-            albedo_sigma: 0.1,
-            mirror_alpha: 0.1,
-            despeckle: 3,
+            albedo_sigma: 0.3,
+            mirror_alpha: 0.02,
+            despeckle: 2,
         }
     }
 }
@@ -197,27 +197,29 @@ impl Image<'_> {
         })
     }
 
-    /// How well the surfaces of two pixels agree, `offset` pixels apart.
-    fn similarity(&self, i: usize, j: usize, offset: Vec2) -> f32 {
+    /// How little the surfaces of two pixels agree, `offset` pixels apart: minus the logarithm of a weight.
+    fn difference(&self, i: usize, j: usize, offset: Vec2) -> f32 {
         let (a, b) = (&self.guides[i], &self.guides[j]);
-        let lengths = a.normal.length() * b.normal.length();
+        let lengths = (a.normal.length_squared() * b.normal.length_squared()).sqrt();
         // Two pixels of sky agree.
-        let cos = if lengths > 1e-6 {
-            a.normal.dot(b.normal) / lengths
-        } else if a.normal == b.normal {
-            1.0
-        } else {
-            0.0
-        };
+        let cos = if lengths > 1e-6 { a.normal.dot(b.normal) / lengths } else { f32::from(a.normal == b.normal) };
         let slope = self.slopes[i].dot(offset.abs()) + 1e-3 * a.depth;
         let depth = (a.depth - b.depth).abs() / (self.params.depth_sigma * slope + f32::MIN_POSITIVE);
         let albedo = (a.albedo - b.albedo).length_squared() / (self.params.albedo_sigma * self.params.albedo_sigma);
-        cos.max(0.0).powf(self.params.normal_power) * (-depth - albedo).exp()
+        self.params.normal_power * (1.0 - cos) + depth + albedo
+    }
+
+    /// Whether a pixel's surface has the layer at all.
+    fn is_lit(&self, i: usize) -> bool {
+        self.guides[i].factor != Rgb::ZERO
     }
 
     /// Light in which no pixel is brighter than the neighbour of the given rank.
     fn despeckled(&self, light: &[Rgb]) -> Vec<Rgb> {
         self.map(|i| {
+            if !self.is_lit(i) {
+                return light[i];
+            }
             let mut near: Vec<f32> = self.around(i, 2, 1).filter(|&(j, _)| j != i).map(|(j, _)| luminance(light[j])).collect();
             near.sort_unstable_by(|a, b| b.total_cmp(a));
             let own = luminance(light[i]);
@@ -231,9 +233,12 @@ impl Image<'_> {
     /// The light with the variance of its luminance over the 7 x 7 pixels around, weighted by how well they agree.
     fn with_variance(&self, light: &[Rgb]) -> Signal {
         self.map(|i| {
+            if !self.is_lit(i) {
+                return (light[i], 0.0);
+            }
             let (mut sum, mut squares, mut total) = (0.0, 0.0, 0.0);
             for (j, [dx, dy]) in self.around(i, 3, 1) {
-                let weight = self.similarity(i, j, Vec2::new(dx as f32, dy as f32));
+                let weight = (-self.difference(i, j, Vec2::new(dx as f32, dy as f32))).exp();
                 let y = luminance(light[j]);
                 (sum, squares, total) = (sum + weight * y, squares + weight * y * y, total + weight);
             }
@@ -245,6 +250,9 @@ impl Image<'_> {
     /// One level of the wavelet: taps `step` pixels apart.
     fn smoothed(&self, signal: &Signal, step: isize) -> Signal {
         self.map(|i| {
+            if !self.is_lit(i) {
+                return signal[i];
+            }
             let (mut blurred, mut total) = (0.0, 0.0);
             for (j, [dx, dy]) in self.around(i, 1, 1) {
                 let weight = [0.5, 0.25][dx.unsigned_abs()] * [0.5, 0.25][dy.unsigned_abs()];
@@ -260,7 +268,7 @@ impl Image<'_> {
                     true => spline,
                     false => {
                         let bright = (luminance(signal[j].0) - own).abs() / noise;
-                        spline * self.similarity(i, j, offset) * (-bright).exp()
+                        spline * (-self.difference(i, j, offset) - bright).exp()
                     }
                 };
                 light += signal[j].0 * weight;
