@@ -267,7 +267,7 @@ fn adaptive_sampling_spends_paths_where_they_are_needed() {
         let lift = r#"<transform name="to_world"><translate value="0,0,0.1"/></transform>"#;
         let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{lift}{reflector}</shape>"#)));
         let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([64, 32]));
-        let params = BakeParams { spp: MOST, error, ..BakeParams::default() };
+        let params = BakeParams { spp: MOST, error, roughness_scale: 0.5, ..BakeParams::default() };
         let traced = bake_glossy(
             &Bake { world: &world, params: &params, seed, lightmap: None, gpu: None },
             &mut probe,

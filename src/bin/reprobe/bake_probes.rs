@@ -8,7 +8,7 @@ use reprobe::gpu::{GpuScene, ProbePaths};
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
-use reprobe::probe::bake::{Bake, BakeParams, Traced, bake_glossy, probe_geometry};
+use reprobe::probe::bake::{Bake, BakeParams, PAPER_ROUGHNESS_SCALE, Traced, bake_glossy, probe_geometry};
 use reprobe::probe::file::{BakedSet, MAX_MATERIALS};
 use reprobe::probe::placement::ProbeGrid;
 use reprobe::probe::qhmap::{ParameterMap, map_paths};
@@ -52,9 +52,9 @@ pub struct Args {
     /// Trace a texel until its standard error is this fraction of its luminance, by the variance of its first 8 paths and its neighbours'
     #[arg(long, value_name = "E")]
     error: Option<f32>,
-    /// Factor on roughness at the first glossy vertex
-    #[arg(long, value_name = "S", default_value_t = BakeParams::default().roughness_scale)]
-    roughness_scale: f32,
+    /// Factor on roughness at the first glossy vertex [default: 0.75; with --paper 0.5]
+    #[arg(long, value_name = "S")]
+    roughness_scale: Option<f32>,
     /// Spread a texel's paths over its solid angle, in place of sending all through its centre
     #[arg(long)]
     spread: bool,
@@ -79,7 +79,7 @@ pub struct Args {
     /// Rays a pixel along one side, for --for-path
     #[arg(long, value_name = "N", default_value_t = 1)]
     supersample: u32,
-    /// Choose texels as the paper does, for --for-path
+    /// The paper's roughness factor, and its choice of texels with --for-path
     #[arg(long)]
     paper: bool,
     /// Choose texels with this parameter of the gather, as render-path's --set, for --for-path
@@ -93,8 +93,10 @@ pub struct Args {
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let began = Instant::now();
-    if args.spp == 0 || !(args.roughness_scale > 0.0 && args.roughness_scale <= 1.0) {
-        bail!("--spp {} --roughness-scale {}: expected at least 1, and a factor in (0, 1]", args.spp, args.roughness_scale);
+    let by_choice = if args.paper { PAPER_ROUGHNESS_SCALE } else { BakeParams::default().roughness_scale };
+    let roughness_scale = args.roughness_scale.unwrap_or(by_choice);
+    if args.spp == 0 || !(roughness_scale > 0.0 && roughness_scale <= 1.0) {
+        bail!("--spp {} --roughness-scale {roughness_scale}: expected at least 1, and a factor in (0, 1]", args.spp);
     }
     if let Some(error) = args.error.filter(|e| !(*e > 0.0 && *e < f32::INFINITY)) {
         bail!("--error {error}: expected a positive number, such as 0.05 for 5 %");
@@ -114,7 +116,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     maps.provenance.check_scene(&args.qhmap, &scene.hash)?;
     maps.provenance.check_input(&args.qhmap, "probes", &hash_file(&args.probes)?)?;
 
-    let params = BakeParams { spp: args.spp, error: args.error, roughness_scale: args.roughness_scale, spread: args.spread };
+    let params = BakeParams { spp: args.spp, error: args.error, roughness_scale, spread: args.spread };
     let progress = common.progress();
     let passes = |paper: bool| if paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() };
     let gather = apply(&passes(args.paper), &args.set)?.gather;

@@ -231,7 +231,8 @@ impl Pipeline<'_> {
             .option("--probes", bakes.grid.display())
             .option("--qhmap", bakes.qhmap.display())
             .option("--output", bakes.probes.display())
-            .option("--spp", settings.spp);
+            .option("--spp", settings.spp)
+            .flag("--paper", paper);
         if !paper {
             probes = probes.option("--lightmap", bakes.lightmap.display());
         }
@@ -241,8 +242,7 @@ impl Pipeline<'_> {
                 .option("--curvature", bakes.curvature.display())
                 .optional("--size", self.size())
                 .optional("--frames", self.frames)
-                .option("--supersample", settings.supersample)
-                .flag("--paper", paper);
+                .option("--supersample", settings.supersample);
         }
         vec![
             self.path_option(place, "--path").option("--output", bakes.grid.display()),

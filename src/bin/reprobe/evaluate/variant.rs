@@ -114,12 +114,12 @@ pub const WHOLE: &str = "glossy-probes";
 
 /// Figures 12 to 15, and the filters of Figure 10. `probes` is the number of probes of the whole method.
 ///
-/// As in the paper, Figures 12 and 13 are without the filter; every pixel is then searched for in full, as the paper does, since a pixel
+/// As in the paper, Figures 12 and 13 are of probes of half roughness, without the filter; every pixel is then searched for in full, as the paper does, since a pixel
 /// that begins where its neighbour ended searches further than its own window.
 pub fn paper(probes: u32) -> Result<Vec<Variant>, String> {
     let half = format!("place-probes:--count={}", (probes / 2).max(1));
     let double = format!("place-probes:--count={}", 2 * probes);
-    let unfiltered = "footprint=null,gather.anchors=1";
+    let unfiltered = "footprint=null,gather.anchors=1,bake-probes:--roughness-scale=0.5";
     let list = [
         ("unfiltered", "Fig. 15", "no filter, half roughness", WHOLE, unfiltered.to_owned()),
         (
