@@ -299,4 +299,7 @@ fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
     let ulr = command("--method ulr --probes out/probes -o d --budget-ms 200");
     assert!(f.refusal(&ulr).contains("no sample count"));
     assert!(f.refusal(&path_trace("-o d --denoise --layers full")).contains("--layers full"));
+    assert!(f.refusal(&command("--probes out/probes -o d --budget-ms 200")).contains("no sample count"));
+    assert!(f.refusal(&command("--method ulr --probes out/probes -o d --denoise")).contains("path-trace alone"));
+    assert!(f.refusal(&command("--method ulr --probes out/probes -o d --set supersample=0")).contains("1 to 8"));
 }

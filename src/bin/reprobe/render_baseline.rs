@@ -6,7 +6,7 @@ use crate::render_path::{Args, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
 use crate::views::View;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
@@ -35,8 +35,11 @@ struct Setup {
 }
 
 impl Setup {
-    fn new(args: &Args, common: &Common, timings: &mut Timings) -> anyhow::Result<Self> {
+    fn new(args: &Args, common: &Common, timings: &mut Timings, supersample: u32) -> anyhow::Result<Self> {
         common.refuse_gpu()?;
+        if !(1..=8).contains(&supersample) {
+            bail!("--set supersample={supersample}: expected 1 to 8");
+        }
         let (world, load_ms) = timed(|| common.opaque_world(&args.scene));
         let world = world?;
         timings.load_ms = load_ms;
@@ -77,7 +80,7 @@ impl Setup {
 
 pub fn run_ulr(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
     let params = apply(&UlrParams { supersample: args.supersample, ..UlrParams::default() }, &args.set)?;
-    let setup = Setup::new(args, common, &mut timings)?;
+    let setup = Setup::new(args, common, &mut timings, params.supersample)?;
     let folder = args.probes.as_ref().context("--method ulr needs --probes DIR, written by bake-probes")?;
     let mut store = ProbeStore::open(folder, &setup.world.scene, params.probes as usize)?;
     if store.set.views.is_some() {
@@ -109,7 +112,7 @@ pub fn run_ulr(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Re
 pub fn run_image_space_gather(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
     let base = ImageSpaceGatherParams { supersample: args.supersample, ..ImageSpaceGatherParams::default() };
     let base = apply(&ImageSpaceGatherParams { samples: args.samples.unwrap_or(base.samples), ..base }, &args.set)?;
-    let setup = Setup::new(args, common, &mut timings)?;
+    let setup = Setup::new(args, common, &mut timings, base.supersample)?;
     let lightmap = setup.lightmap(&timings.method)?;
     let with = |samples| ImageSpaceGatherParams { samples, ..base };
     let mut render = |view: &View, samples: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {
@@ -134,7 +137,7 @@ pub fn run_lightmap_rt(args: &Args, common: &Common, mut timings: Timings) -> an
     let base = LightmapRtParams { supersample: args.supersample, ..LightmapRtParams::default() };
     let bounces = args.max_depth.unwrap_or(base.bounces);
     let base = apply(&LightmapRtParams { samples: args.samples.unwrap_or(base.samples), bounces, ..base }, &args.set)?;
-    let setup = Setup::new(args, common, &mut timings)?;
+    let setup = Setup::new(args, common, &mut timings, base.supersample)?;
     let lightmap = setup.lightmap(&timings.method)?;
     let with = |samples| LightmapRtParams { samples, ..base };
     let mut render = |view: &View, samples: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {

@@ -142,6 +142,12 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         clock: "cpu".into(),
         ..Timings::default()
     };
+    if args.denoise && args.method != Method::PathTrace {
+        bail!("--denoise filters the frames of --method path-trace alone");
+    }
+    if args.method == Method::GlossyProbes && (args.budget_ms.is_some() || args.match_time.is_some()) {
+        bail!("--method glossy-probes has no sample count that a budget could choose");
+    }
     match args.method {
         Method::GlossyProbes => render_glossy::run(args, common, timings),
         Method::PathTrace => run_path_trace(args, common, timings),

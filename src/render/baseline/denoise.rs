@@ -26,6 +26,8 @@ const GUIDE_SAMPLES: u32 = 8;
 const MIN_ALBEDO: f32 = 0.02;
 /// Depth that stands for the environment, in units of nothing: farther than all.
 const FAR: f32 = 1e4;
+/// Most levels: holes of 4096 pixels.
+const MOST_LEVELS: u32 = 12;
 /// One row of the B3 spline.
 const SPLINE: [f32; 5] = [1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 
@@ -153,7 +155,7 @@ fn filter_layer(layer: &[Rgb], guides: &[Guide], width: usize, params: &DenoiseP
     let light: Vec<Rgb> = layer.iter().zip(guides).map(|(&c, g)| c / factor(g)).collect();
     let light = if params.despeckle > 0 { image.despeckled(&light) } else { light };
     let mut signal = image.with_variance(&light);
-    for level in 0..params.levels {
+    for level in 0..params.levels.min(MOST_LEVELS) {
         signal = image.smoothed(&signal, 1 << level);
     }
     signal.iter().zip(guides).map(|((c, _), g)| *c * factor(g)).collect()

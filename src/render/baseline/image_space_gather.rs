@@ -29,6 +29,8 @@ use std::f32::consts::TAU;
 const LOBE_SIGMA: f32 = 0.61;
 /// Where a Gaussian ends, in standard deviations.
 const REACH: f32 = 2.5;
+/// Longest radius that can be asked for, pixels.
+const MAX_RADIUS: f32 = 4096.0;
 /// Angle between the directions of successive taps: the golden one.
 const GOLDEN_ANGLE: f32 = 2.399_963_2;
 
@@ -143,7 +145,7 @@ impl Image<'_> {
     /// the virtual image of the hit lies at d_c + d_r.
     fn sigma(&self, alpha: f32, d_c: f32, d_r: f32) -> f32 {
         let share = if d_r.is_finite() { d_r / (d_c + d_r) } else { 1.0 };
-        let limit = self.params.max_radius / REACH;
+        let limit = self.params.max_radius.min(MAX_RADIUS) / REACH;
         (2.0 * LOBE_SIGMA * alpha * share * self.focal).min(limit)
     }
 
