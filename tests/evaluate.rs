@@ -136,6 +136,8 @@ fn given_bakes_and_a_given_reference_are_used_as_they_are() {
     assert!(figures["costs"]["methods"]["glossy-probes"]["probes"]["baked"].as_u64().unwrap() > 0);
     let message = f.refusal(&format!("{given} --reference given --reference-spp 3"));
     assert!(message.contains("cannot be used with"), "{message}");
+    let message = f.refusal("--size 48x32 --reference given");
+    assert!(message.contains("24 x 16") && message.contains("48 x 32"), "{message}");
     std::fs::remove_file(f.at("given/0002.exr")).unwrap();
     let message = f.refusal(&format!("{given} --reference given"));
     assert!(message.contains("0002.exr") && message.contains("every frame"), "{message}");

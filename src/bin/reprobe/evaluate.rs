@@ -1,21 +1,20 @@
 //! `reprobe evaluate`: methods and ablations against one reference.
 
+mod costs;
 mod measure;
 mod plan;
 mod variant;
 
 use crate::common::{Common, Outcome, parse_size};
 use crate::pipeline::{Preset, Settings};
-use crate::timings::{Timings, frame_ms, is_rendering};
 use crate::views::{FrameList, parse_frames, views};
 use anyhow::bail;
+use costs::execute;
 use measure::{Subjects, file, layers, measure};
-use plan::{Plan, Planned, frames_folder, plan, reference_folder};
+use plan::{frames_folder, plan, reference_folder};
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{Provenance, atomic};
-use reprobe::metric::evaluation::{Costs, Evaluation, MethodCost, MethodErrors, ProbeCost, StageCost, html, markdown};
-use reprobe::probe::store::ProbeStore;
-use reprobe::scene::Scene;
+use reprobe::metric::evaluation::{Costs, Evaluation, MethodErrors, html, markdown};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -165,12 +164,14 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         return Ok(Outcome { summary: lines.join("\n"), figures: json!({ "commands": lines }), ..Outcome::default() });
     }
     let world = common.opaque_world(&args.scene)?;
-    let frames: Vec<u32> =
-        views(common, &world.scene, Some(&args.path), size, args.frames.as_ref())?.iter().map(|v| v.frame).collect();
+    let views = views(common, &world.scene, Some(&args.path), size, args.frames.as_ref())?;
+    let frames: Vec<u32> = views.iter().map(|v| v.frame).collect();
+    let size = views[0].camera.size;
     let folders: Vec<PathBuf> = variants.iter().map(|v| frames_folder(args, v)).collect();
     let reference = reference_folder(args);
     let page_bytes = args.page_mb as usize * 1_000_000;
-    let subjects = Subjects { methods: &folders, reference: &reference, frames: &frames, exposure: args.exposure, page_bytes };
+    let subjects =
+        Subjects { methods: &folders, reference: &reference, frames: &frames, size, exposure: args.exposure, page_bytes };
     if args.reference.is_some() {
         // Before hours of work.
         layers(&subjects)?;
@@ -180,9 +181,10 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let layers = layers(&subjects)?;
     let measured = measure(&subjects, &layers, common)?;
     let mut provenance = Provenance::new("evaluate", &world.scene.hash, common.seed, &json!({ "exposure": args.exposure }));
-    for (name, folder) in variants.iter().map(|v| v.name.as_str()).zip(&folders).chain([("reference", &reference)]) {
-        provenance = provenance.with_input(name, hash_frames(folder, &frames)?);
+    for (variant, folder) in variants.iter().zip(&folders) {
+        provenance = provenance.with_input(&format!("frames/{}", variant.name), hash_frames(folder, &frames)?);
     }
+    provenance = provenance.with_input("reference", hash_frames(&reference, &frames)?);
     let methods = variants.iter().zip(measured.errors).map(|(v, layers)| MethodErrors {
         name: v.name.clone(),
         method: v.method_name(),
@@ -193,7 +195,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let evaluation = Evaluation {
         scene: scene_name(&args.scene),
         path: stem(&args.path),
-        size: measured.size,
+        size: size.map(|n| n as usize),
         reference: args.reference.as_ref().map_or_else(
             || format!("path-trace, {reference_spp} samples a pixel"),
             |folder| format!("the frames of {}", folder.file_name().unwrap_or_default().to_string_lossy()),
@@ -228,61 +230,6 @@ fn outcome(evaluation: &Evaluation, costs: &Costs, page: &Path, seconds: f64) ->
         figures: json!({ "methods": methods, "costs": costs, "seconds": seconds }),
         ..Outcome::default()
     }
-}
-
-/// Runs all commands; what they took is added to what earlier runs have noted in `timings.json`.
-fn execute(args: &Args, common: &Common, plan: &Plan, variants: &[Variant], scene: &Scene) -> anyhow::Result<Costs> {
-    let file = args.output.join("timings.json");
-    let earlier: Costs = std::fs::read_to_string(&file).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
-    let total = plan.commands().count();
-    let mut costs = Costs::default();
-    for (i, Planned { stage, users, .. }) in plan.commands().enumerate() {
-        let clock = Instant::now();
-        let outcome = stage.execute(common, &format!("[{} of {total}] ", i + 1))?;
-        let took = clock.elapsed().as_secs_f64();
-        let command = stage.command_line();
-        let before = earlier.stages.iter().find(|s| s.command == command).and_then(|s| s.seconds);
-        let seconds = if was_there(&outcome.figures) { before } else { Some(before.unwrap_or(0.0).max(took)) };
-        if i < plan.bakes.len() {
-            let methods = users.iter().map(|&u| variants[u].name.clone()).collect();
-            costs.stages.push(StageCost { command, stage: stage.command().into(), methods, seconds });
-            // Noted at once, as the next stage may take hours.
-            let noted = Costs { methods: earlier.methods.clone(), ..costs.clone() };
-            atomic::write_json(&file, &noted)?;
-        }
-    }
-    for (variant, (planned, probes)) in variants.iter().zip(plan.frames.iter().zip(&plan.probes)) {
-        let cost = method_cost(&planned.output, probes.as_deref(), &variant.name, &costs, scene);
-        costs.methods.insert(variant.name.clone(), cost);
-    }
-    atomic::write_json(&file, &costs)?;
-    Ok(costs)
-}
-
-/// Whether a stage's figures say that it had nothing to do.
-fn was_there(figures: &Value) -> bool {
-    let is_whole = figures["kept"].is_u64() && figures["kept"] == figures["count"];
-    figures["up_to_date"] == true || figures["baked"] == 0 || is_whole
-}
-
-fn method_cost(frames: &Path, probes: Option<&Path>, name: &str, costs: &Costs, scene: &Scene) -> MethodCost {
-    let Some(timings) = Timings::read(&frames.join("timings.json")) else { return MethodCost::default() };
-    let frame_ms = frame_ms(&timings.mean_ms);
-    let mut passes_ms = timings.mean_ms;
-    passes_ms.retain(|pass, _| is_rendering(pass));
-    let mine = costs.stages.iter().filter(|s| s.methods.iter().any(|m| m == name));
-    let precompute_seconds = mine.map(|s| s.seconds).sum::<Option<f64>>().filter(|&s| s > 0.0);
-    let probes = probes.and_then(|folder| probe_cost(folder, scene));
-    MethodCost { frame_ms, passes_ms, precompute_seconds, probes }
-}
-
-/// What a set of probes holds; `None` for a folder of something else.
-fn probe_cost(folder: &Path, scene: &Scene) -> Option<ProbeCost> {
-    let mut store = ProbeStore::open(folder, scene, 8).ok()?;
-    let baked: Vec<usize> = (0..store.set.files.len()).filter(|&i| !store.set.files[i].is_empty()).collect();
-    let one = store.probe(*baked.first()?).ok()?.bytes();
-    let count = store.set.grid.len() - store.set.grid.blocked.len();
-    Some(ProbeCost { count, baked: baked.len(), size: store.set.size, bytes: (baked.len() * one) as u64 })
 }
 
 fn hash_frames(folder: &Path, frames: &[u32]) -> anyhow::Result<String> {

@@ -21,6 +21,8 @@ pub struct Subjects<'a> {
     pub reference: &'a Path,
     /// Numbers of the frames, ascending.
     pub frames: &'a [u32],
+    /// Their width and height, pixels.
+    pub size: [u32; 2],
     /// Stops.
     pub exposure: f32,
     /// About how many bytes the page's pictures may take.
@@ -33,8 +35,6 @@ pub struct Measured {
     pub errors: Vec<BTreeMap<String, LayerErrors>>,
     /// Pictures by layer.
     pub shown: BTreeMap<String, Shown>,
-    /// Pixels.
-    pub size: [usize; 2],
 }
 
 /// The layers that the references have, glossy first.
@@ -51,6 +51,10 @@ pub fn layers(subjects: &Subjects) -> anyhow::Result<Vec<&'static str>> {
     }
     let path = subjects.reference.join(file(subjects.frames[0]));
     let image = ExrImage::read(&path)?;
+    let [w, h] = subjects.size;
+    if [image.width, image.height] != [w as usize, h as usize] {
+        bail!("{} has {} x {} pixels, the frames {w} x {h}: give --size", path.display(), image.width, image.height);
+    }
     let has = |layer: &&str| image.rgb(&path, if *layer == "full" { "" } else { layer }).is_ok();
     let layers: Vec<_> = ["glossy", "full"].into_iter().filter(has).collect();
     anyhow::ensure!(!layers.is_empty(), "{}: found neither R, G, B nor glossy.R, glossy.G, glossy.B", path.display());
@@ -96,7 +100,6 @@ pub fn measure(subjects: &Subjects, layers: &[&str], common: &Common) -> anyhow:
 
     let mut errors = vec![BTreeMap::new(); subjects.methods.len()];
     let mut shown: BTreeMap<String, Shown> = BTreeMap::new();
-    let mut size = [0, 0];
     let mut all = results.into_iter();
     for layer in layers {
         let mut methods = Vec::new();
@@ -114,12 +117,11 @@ pub fn measure(subjects: &Subjects, layers: &[&str], common: &Common) -> anyhow:
         for frame in (0..count).step_by(every) {
             let path = subjects.reference.join(file(subjects.frames[frame]));
             let [image, _] = read_pair(&path, &path, layer)?;
-            size = image.size;
-            reference.frames.insert(frame, jpeg_rgb(&to_rgb8(&display(&image, subjects.exposure)), size)?);
+            reference.frames.insert(frame, jpeg_rgb(&to_rgb8(&display(&image, subjects.exposure)), image.size)?);
         }
         shown.insert((*layer).to_owned(), Shown { reference, methods });
     }
-    Ok(Measured { errors, shown, size })
+    Ok(Measured { errors, shown })
 }
 
 /// One frame of one method; with its pictures, if `draw`.

@@ -1,0 +1,71 @@
+//! Runs the commands of an evaluation, and notes what they took.
+
+use super::Args;
+use super::plan::{Plan, Planned};
+use super::variant::Variant;
+use crate::common::Common;
+use crate::timings::{Timings, frame_ms, is_rendering};
+use reprobe::io::atomic;
+use reprobe::metric::evaluation::{Costs, MethodCost, ProbeCost, StageCost};
+use reprobe::probe::store::ProbeStore;
+use reprobe::scene::Scene;
+use serde_json::Value;
+use std::path::Path;
+use std::time::Instant;
+
+/// Runs all commands; what they took is added to what earlier runs have noted in `timings.json`.
+pub fn execute(args: &Args, common: &Common, plan: &Plan, variants: &[Variant], scene: &Scene) -> anyhow::Result<Costs> {
+    let file = args.output.join("timings.json");
+    let earlier: Costs = std::fs::read_to_string(&file).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
+    let total = plan.commands().count();
+    let mut costs = Costs::default();
+    for (i, Planned { stage, users, .. }) in plan.commands().enumerate() {
+        let clock = Instant::now();
+        let outcome = stage.execute(common, &format!("[{} of {total}] ", i + 1))?;
+        let took = clock.elapsed().as_secs_f64();
+        let command = stage.command_line();
+        let before = earlier.stages.iter().find(|s| s.command == command).and_then(|s| s.seconds);
+        let seconds = if was_there(&outcome.figures) { before } else { Some(before.unwrap_or(0.0).max(took)) };
+        if i < plan.bakes.len() {
+            let methods = users.iter().map(|&u| variants[u].name.clone()).collect();
+            costs.stages.push(StageCost { command, stage: stage.command().into(), methods, seconds });
+            // Noted at once, as the next stage may take hours.
+            let mut noted = Costs { methods: earlier.methods.clone(), ..costs.clone() };
+            let is_new = |s: &&StageCost| costs.stages.iter().all(|c| c.command != s.command);
+            noted.stages.extend(earlier.stages.iter().filter(is_new).cloned());
+            atomic::write_json(&file, &noted)?;
+        }
+    }
+    for (variant, (planned, probes)) in variants.iter().zip(plan.frames.iter().zip(&plan.probes)) {
+        let cost = method_cost(&planned.output, probes.as_deref(), &variant.name, &costs, scene);
+        costs.methods.insert(variant.name.clone(), cost);
+    }
+    atomic::write_json(&file, &costs)?;
+    Ok(costs)
+}
+
+/// Whether a stage's figures say that it had nothing to do.
+fn was_there(figures: &Value) -> bool {
+    let is_whole = figures["kept"].is_u64() && figures["kept"] == figures["count"];
+    figures["up_to_date"] == true || figures["baked"] == 0 || is_whole
+}
+
+fn method_cost(frames: &Path, probes: Option<&Path>, name: &str, costs: &Costs, scene: &Scene) -> MethodCost {
+    let Some(timings) = Timings::read(&frames.join("timings.json")) else { return MethodCost::default() };
+    let frame_ms = frame_ms(&timings.mean_ms);
+    let mut passes_ms = timings.mean_ms;
+    passes_ms.retain(|pass, _| is_rendering(pass));
+    let mine = costs.stages.iter().filter(|s| s.methods.iter().any(|m| m == name));
+    let precompute_seconds = mine.map(|s| s.seconds).sum::<Option<f64>>().filter(|&s| s > 0.0);
+    let probes = probes.and_then(|folder| probe_cost(folder, scene));
+    MethodCost { frame_ms, passes_ms, precompute_seconds, probes }
+}
+
+/// What a set of probes holds; `None` for a folder of something else.
+fn probe_cost(folder: &Path, scene: &Scene) -> Option<ProbeCost> {
+    let mut store = ProbeStore::open(folder, scene, 8).ok()?;
+    let baked: Vec<usize> = (0..store.set.files.len()).filter(|&i| !store.set.files[i].is_empty()).collect();
+    let one = store.probe(*baked.first()?).ok()?.bytes();
+    let count = store.set.grid.len() - store.set.grid.blocked.len();
+    Some(ProbeCost { count, baked: baked.len(), size: store.set.size, bytes: (baked.len() * one) as u64 })
+}
