@@ -160,12 +160,16 @@ impl<'a> Renderer<'a> {
 
     /// Makes room for frames of `size` and for at least one probe of so many texels. An error where memory does not suffice.
     pub fn reserve(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<()> {
-        let n = self.params.supersample;
-        let fine = size.map(|s| s * n);
-        if self.target.as_ref().is_some_and(|t| t.view.size == fine) {
-            return Ok(());
+        self.target = Some(self.reserved(size, probe)?);
+        Ok(())
+    }
+
+    /// The buffers for frames of `size`, taken out.
+    fn reserved(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<Target> {
+        let fine = size.map(|s| s * self.params.supersample);
+        if let Some(target) = self.target.take().filter(|t| t.view.size == fine) {
+            return Ok(target);
         }
-        self.target = None;
         let area = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
         let frame = area(fine) * Target::BYTES + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
         let probe = area(probe) * probes::TEXEL;
@@ -181,19 +185,18 @@ impl<'a> Renderer<'a> {
             )));
         }
         self.resident.set_budget(self.memory - frame);
-        self.target = Some(Target::new(&self.gpu, fine, &self.params)?);
-        Ok(())
+        Target::new(&self.gpu, fine, &self.params)
     }
 
     /// Renders the next frame of a path; meanwhile probes are uploaded for the one after it, where there is `next`.
     pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
-        self.reserve(camera.size, probes.set.size)?;
-        let gpu = self.gpu.clone();
-        gpu.checked(|| self.passes(camera, next, probes))?
+        let (gpu, mut target) = (self.gpu.clone(), self.reserved(camera.size, probes.set.size)?);
+        let frame = gpu.checked(|| self.passes(&mut target, camera, next, probes))??;
+        self.target = Some(target);
+        Ok(frame)
     }
 
-    fn passes(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
-        let Some(t) = &mut self.target else { unreachable!("reserved") };
+    fn passes(&mut self, t: &mut Target, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
         let (gpu, params, eye) = (&*self.gpu, &self.params, camera.position());
         let fine = Camera { size: t.view.size, ..camera.clone() };
         let albedos = params.gather.albedo_ratio.then_some(self.roughness_scale);
