@@ -21,6 +21,17 @@ pub enum Choice {
     Named(String),
 }
 
+impl std::fmt::Display for Choice {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Cpu => f.write_str("cpu"),
+            Self::Gpu => f.write_str("gpu"),
+            Self::Named(words) => write!(f, "gpu:{words}"),
+        }
+    }
+}
+
 impl std::str::FromStr for Choice {
     type Err = String;
 

@@ -96,7 +96,9 @@ impl Common {
         match self.device {
             Choice::Auto | Choice::Cpu => Ok(()),
             Choice::Gpu | Choice::Named(_) => {
-                bail!("--device: resmap, bake-probes, bake-lightmap, render-path and run use a GPU; use --device cpu here")
+                bail!(
+                    "--device: resmap, bake-probes, bake-lightmap, run, evaluate and render-path's glossy-probes and path-trace use a GPU; use --device cpu here"
+                )
             }
         }
     }

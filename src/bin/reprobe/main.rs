@@ -70,8 +70,8 @@ fn main() -> ExitCode {
 }
 
 fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
-    use Command::{BakeLightmap, BakeProbes, Devices, RenderPath, Resmap, Run};
-    if !matches!(command, Resmap(_) | BakeProbes(_) | BakeLightmap(_) | RenderPath(_) | Devices(_) | Run(_)) {
+    use Command::{BakeLightmap, BakeProbes, Devices, Evaluate, RenderPath, Resmap, Run};
+    if !matches!(command, Resmap(_) | BakeProbes(_) | BakeLightmap(_) | RenderPath(_) | Devices(_) | Run(_) | Evaluate(_)) {
         common.refuse_gpu()?;
     }
     match command {

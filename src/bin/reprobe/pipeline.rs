@@ -5,6 +5,7 @@ use crate::views::FrameList;
 use crate::{Cli, dispatch};
 use anyhow::Context;
 use clap::Parser;
+use reprobe::gpu::Choice;
 use std::path::{Path, PathBuf};
 
 /// What a preset stands for.
@@ -203,6 +204,9 @@ pub struct Pipeline<'a> {
     pub settings: Settings,
 }
 
+/// Stages that can use a GPU.
+const ON_GPU: [&str; 4] = ["resmap", "bake-probes", "bake-lightmap", "render-path"];
+
 impl Pipeline<'_> {
     /// A command that reads the scene.
     pub fn stage(&self, command: &str) -> Stage {
@@ -210,6 +214,8 @@ impl Pipeline<'_> {
         let mut s = Stage::new(command).path(self.scene).option("--seed", common.seed);
         s = s.optional("--threads", common.threads).flag("--quiet", common.quiet);
         s = s.optional("--unit-scale", (common.unit_scale != 1.0).then_some(common.unit_scale));
+        let device = Some(&common.device).filter(|d| **d != Choice::Auto && ON_GPU.contains(&command));
+        s = s.optional("--device", device);
         common.defines.iter().fold(s, |s, d| s.option("--define", d))
     }
 
