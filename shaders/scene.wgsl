@@ -60,8 +60,8 @@ struct Model {
     alpha: f32,
     // How many of the textures there are.
     slots: u32,
-    pad0: u32,
-    pad1: u32,
+    padding0: u32,
+    padding1: u32,
 }
 
 const TRANSMISSIVE: u32 = 1u;
@@ -94,7 +94,7 @@ struct Emitter {
     // Area lights: the first of its triangles in `near`, and in the scene; NONE where it is never sampled.
     first: u32,
     start: u32,
-    pad: u32,
+    padding: u32,
 }
 
 // What the light tree chooses from: a triangle of an area light, or (triangle NONE) a point or spot.
@@ -102,7 +102,7 @@ struct Near {
     triangle: u32,
     emitter: u32,
     area: f32,
-    pad: u32,
+    padding: u32,
 }
 
 // Twin: transport::light_tree::Node, byte for byte.

@@ -36,3 +36,17 @@ impl From<&Camera> for GpuCamera {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::kernel::shader;
+    use super::super::layout::check;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(shader!("camera"), GpuCamera as "Camera" {
+            x, focal_px, y, aperture_radius, z, focus_distance, position, width, height
+        });
+    }
+}

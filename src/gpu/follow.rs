@@ -1,6 +1,6 @@
 //! Samples of paths that begin at given points: the twin of [`crate::transport::path`]'s entry points.
 
-use super::kernel::Kernel;
+use super::kernel::{Kernel, shader};
 use super::pace::Pace;
 use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
 use crate::Result;
@@ -19,8 +19,10 @@ pub(super) const WORKGROUP: usize = 64;
 pub struct PathStart {
     /// Triangle.
     pub triangle: u32,
-    /// Barycentric weights of its second and third vertex.
-    pub barycentric: [f32; 2],
+    /// Barycentric weight of its second vertex.
+    pub u: f32,
+    /// Barycentric weight of its third vertex.
+    pub v: f32,
     /// Random stream.
     pub stream: u32,
     /// Unit direction towards the viewer, world.
@@ -42,12 +44,19 @@ pub(super) enum Purpose {
     Irradiance,
 }
 
+/// `PathParams` of path.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct GpuPathParams {
+    max_depth: u32,
+    rr_depth: u32,
+}
+
 /// `Params` of follow.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Params {
-    max_depth: u32,
-    rr_depth: u32,
+    path: GpuPathParams,
     lobes: u32,
     roughness_scale: f32,
     split: u32,
@@ -89,6 +98,10 @@ pub(super) struct Place {
     pub first_set: u32,
 }
 
+fn source() -> String {
+    [RAYS, MATERIALS, PATHS, shader!("start", "follow")].concat()
+}
+
 /// Follows paths through a scene.
 #[derive(Clone)]
 pub(super) struct Follow {
@@ -100,8 +113,7 @@ pub(super) struct Follow {
 impl Follow {
     /// Compiles it. Where the scene has a light map, paths read diffuse light from it.
     pub fn new(scene: Arc<GpuScene>, path: &PathParams, purpose: Purpose, place: Place) -> Result<Self> {
-        let own = [include_str!("../../shaders/start.wgsl"), include_str!("../../shaders/follow.wgsl")];
-        let source = [RAYS, MATERIALS, PATHS, own[0], own[1]].concat();
+        let source = source();
         let constants = [
             ("IRRADIANCE", f64::from(u8::from(purpose == Purpose::Irradiance))),
             ("HAS_LIGHTMAP", f64::from(u8::from(scene.has_lightmap()))),
@@ -112,8 +124,7 @@ impl Follow {
             Purpose::Irradiance => Query::default(),
         };
         let params = Params {
-            max_depth: path.max_depth,
-            rr_depth: path.rr_depth,
+            path: GpuPathParams { max_depth: path.max_depth, rr_depth: path.rr_depth },
             lobes: u32::from(query.lobes.bits()),
             roughness_scale: query.roughness_scale,
             split: u32::from(query.lobes != Lobes::ALL || purpose == Purpose::Irradiance),
@@ -196,4 +207,18 @@ impl Follow {
 /// Most starts a dispatch: WebGPU's most workgroups along a line, and what a kernel can bind.
 pub(super) fn most_starts(scene: &GpuScene) -> usize {
     (65_535 * WORKGROUP).min(scene.gpu.adapter.max_binding as usize / size_of::<PathStart>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::check;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        let source = source();
+        check!(&source, GpuPathParams as "PathParams" { max_depth, rr_depth });
+        check!(&source, PathStart as "PathStart" { triangle, u, v, stream, wo, first, end });
+        check!(&source, Params as "Params" { path, lobes, roughness_scale, split, starts, skipped, samples, branch, first_set });
+    }
 }

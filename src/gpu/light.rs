@@ -50,7 +50,8 @@ impl LightPaths {
     pub fn light(&self, samples: &[LightStart]) -> Result<Vec<Rgb>> {
         let start = |s: &LightStart| PathStart {
             triangle: s.triangle,
-            barycentric: s.barycentric.to_array(),
+            u: s.barycentric.x,
+            v: s.barycentric.y,
             stream: s.stream,
             wo: [if s.back { -1.0 } else { 1.0 }, 0.0, 0.0],
             first: s.sample,

@@ -2,7 +2,7 @@
 
 use super::camera::GpuCamera;
 use super::follow::{Follow, PathStart, Place, Purpose, SampleSum, WORKGROUP, most_starts};
-use super::kernel::Kernel;
+use super::kernel::{Kernel, shader};
 use super::pace::Pace;
 use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
 use crate::Result;
@@ -40,6 +40,11 @@ struct AddParams {
     samples: u32,
 }
 
+/// What the camera's rays take.
+fn source() -> String {
+    [RAYS, MATERIALS, PATHS, shader!("start", "camera", "camera_ray", "camera_hits")].concat()
+}
+
 /// A path tracer on a device.
 pub struct PathTracer {
     scene: Arc<GpuScene>,
@@ -52,17 +57,8 @@ pub struct PathTracer {
 impl PathTracer {
     /// Compiles it, for the layers or for the full image alone.
     pub fn new(scene: Arc<GpuScene>, path: &PathParams, layers: bool) -> Result<Self> {
-        let source = [
-            RAYS,
-            MATERIALS,
-            PATHS,
-            include_str!("../../shaders/start.wgsl"),
-            include_str!("../../shaders/camera.wgsl"),
-            include_str!("../../shaders/camera_ray.wgsl"),
-            include_str!("../../shaders/camera_hits.wgsl"),
-        ];
-        let hits = Kernel::in_scene(&scene, &source.concat(), "camera_hits", [1, 2], &[])?;
-        let add = Kernel::new(&scene.gpu, include_str!("../../shaders/add_samples.wgsl"), "add_samples")?;
+        let hits = Kernel::in_scene(&scene, &source(), "camera_hits", [1, 2], &[])?;
+        let add = Kernel::new(&scene.gpu, shader!("add_samples"), "add_samples")?;
         // After the set that the camera ray has drawn.
         let place = Place { branch: None, first_set: 1 };
         let whole = Follow::new(scene.clone(), path, Purpose::Scattering(Query::default()), place)?;
@@ -149,5 +145,18 @@ impl PathTracer {
             gpu.dispatch(&self.add, &[&add, &values, frame], groups)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::check;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shaders() {
+        check!(&source(), HitParams as "Params" { camera, seed, frame, first_pixel, pixels, first_sample, samples });
+        let add = shader!("add_samples");
+        check!(add, AddParams as "Params" { quantities, quantity, first_pixel, pixels, samples });
     }
 }

@@ -209,8 +209,8 @@ fn trace(
                     let Range { start: first, end } = range(i);
                     let Hit { triangle, u, v, .. } = centre.hit;
                     let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
-                    let (barycentric, stream) = ([u, v], centre.stream);
-                    PathStart { triangle, barycentric, stream, wo: wo.into(), first, end, padding: [0; 3] }
+                    let stream = centre.stream;
+                    PathStart { triangle, u, v, stream, wo: wo.into(), first, end, padding: [0; 3] }
                 })
                 .collect();
             let sums = gpu.sums(&starts, &|paths| rows.advance(paths as u64))?;

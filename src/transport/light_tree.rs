@@ -62,17 +62,17 @@ pub struct LightTree {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct Node {
-    centre: [[f32; WIDTH]; 3],
-    radius_sq: [f32; WIDTH],
-    axis: [[f32; WIDTH]; 3],
-    cos_spread: [f32; WIDTH],
-    sin_spread: [f32; WIDTH],
-    cos_reach: [f32; WIDTH],
-    power: [f32; WIDTH],
+    pub(crate) centre: [[f32; WIDTH]; 3],
+    pub(crate) radius_sq: [f32; WIDTH],
+    pub(crate) axis: [[f32; WIDTH]; 3],
+    pub(crate) cos_spread: [f32; WIDTH],
+    pub(crate) sin_spread: [f32; WIDTH],
+    pub(crate) cos_reach: [f32; WIDTH],
+    pub(crate) power: [f32; WIDTH],
     /// A node, or an emitter with the bit [`LEAF`].
-    children: [u32; WIDTH],
+    pub(crate) children: [u32; WIDTH],
     /// Node and slot that this one hangs from; the root's says itself.
-    parent: [u32; 2],
+    pub(crate) parent: [u32; 2],
 }
 
 impl LightTree {

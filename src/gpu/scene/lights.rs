@@ -113,3 +113,21 @@ pub(super) fn environments(world: &World, textures: &mut Textures, tables: &mut 
     };
     world.lights.environments.iter().map(of).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::layout::check;
+    use super::super::RAYS;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(RAYS, GpuEmitter as "Emitter" {
+            position, kind, direction, texture, color, cutoff, beam, first, start
+        });
+        check!(RAYS, GpuNear as "Near" { triangle, emitter, area });
+        check!(RAYS, GpuEnvironment as "Environment" {
+            world_from_local, local_from_world, color, scale, image, rows, columns, sines, mean
+        });
+    }
+}

@@ -230,3 +230,18 @@ pub(super) fn tilts(bsdf: &Bsdf) -> usize {
 
 // PLASTIC_COSINES of bsdf.wgsl.
 const _: () = assert!(COSINES == 64);
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::layout::check;
+    use super::super::RAYS;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(RAYS, GpuMaterial as "Material" { model, opacity, lobes, flags });
+        check!(RAYS, GpuModel as "Model" {
+            kind, distribution, lobes, leaves, first, second, table, option, eta, a, k, b, textures, alpha, slots
+        });
+    }
+}

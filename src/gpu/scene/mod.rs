@@ -276,3 +276,20 @@ fn depth(tree: &CwBvh) -> usize {
     }
     deepest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::check;
+    use super::*;
+    use crate::transport::light_tree::Node;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(RAYS, SceneParams as "SceneParams" {
+            environments, suns, sun_list, has_near, sobol, albedo, light_width, light_height, light_back
+        });
+        check!(RAYS, Node as "LightNode" {
+            centre, radius_sq, axis, cos_spread, sin_spread, cos_reach, power, children, parent
+        });
+    }
+}

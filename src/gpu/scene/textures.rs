@@ -106,3 +106,16 @@ fn placed(to_uv: &Affine2) -> GpuTexture {
     let (x, y, t) = (to_uv.matrix2.x_axis, to_uv.matrix2.y_axis, to_uv.translation);
     GpuTexture { to_u: [x.x, y.x, t.x], to_v: [x.y, y.y, t.y], ..GpuTexture::default() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::layout::check;
+    use super::super::RAYS;
+    use super::*;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(RAYS, GpuImage as "Image" { offset, width, height, bytes });
+        check!(RAYS, GpuTexture as "Texture" { to_u, kind, to_v, wrap, color0, scale, color1, nearest, image });
+    }
+}
