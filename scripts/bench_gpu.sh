@@ -7,7 +7,7 @@
 # the paper's; smaller ones, for a trial on a software adapter:
 #
 #   GRID=2x2x2 TEXELS=64x32 LIGHT_TEXELS=20000 SIZE=96x54 SPP=4 FRAMES=0-1 scripts/bench_gpu.sh target/release/reprobe scenes/room/scene.xml \
-#       scenes/room/path.json /tmp/bench gpu:llvmpipe
+#       scenes/room/path.json bench/ gpu:llvmpipe
 set -eu
 
 if [ $# -lt 4 ]; then
