@@ -56,9 +56,9 @@ pub struct FilterParams {
     pub kernel: Kernel,
     /// Evaluation. Paper: four passes.
     pub method: Method,
-    /// Smallest cosine between two normals that may mix, α_n. Paper: 0.8; ours, 0.95.
+    /// Smallest cosine between two normals that may mix, α_n. Paper: 0.8; ours, 0.98.
     pub min_normal_cos: f32,
-    /// Largest difference in depth that may mix, α_d, m. Paper: 0.2; ours, 0.3.
+    /// Largest difference in depth that may mix, α_d, m. Paper: 0.2; ours, 0.15.
     pub depth_threshold: f32,
     /// Lower clamp of E in the confidence 1/E; infinite for no confidence at all. Paper: none (a small one against 0).
     pub min_energy: f32,
@@ -73,8 +73,8 @@ impl Default for FilterParams {
         Self {
             kernel: Kernel::Gaussian,
             method: Method::FourPass,
-            min_normal_cos: 0.95,
-            depth_threshold: 0.3,
+            min_normal_cos: 0.98,
+            depth_threshold: 0.15,
             min_energy: 3.0,
             radius_sigmas: 3.0,
             max_radius: 128.0,
