@@ -21,19 +21,7 @@ fn albedo_entry(i: u32) -> vec2<f32> {
     return vec2(table_f32(scene.albedo + 2u * i), table_f32(scene.albedo + 2u * i + 1u));
 }
 
-fn bsdf_glossy_albedo(s: Surface, wi: vec3<f32>, query: Query) -> vec3<f32> {
-    let root = materials[s.material].model;
-    var sum = vec3(0.0);
-    var u = 0.0;
-    for (var i = 0u; i < models[root].leaves; i++) {
-        let leaf = leaf_at(root, s, wi, i, &u, ALL_LOBES);
-        if leaf.share > 0.0 {
-            sum += leaf.share * leaf_glossy_albedo(leaf.model, leaf.wi, query);
-        }
-    }
-    return sum;
-}
-
+// The leaf's part of the albedo; its textures are in `values`.
 fn leaf_glossy_albedo(m: u32, wi: vec3<f32>, query: Query) -> vec3<f32> {
     switch models[m].kind {
         case DIELECTRIC, THIN_DIELECTRIC, ROUGH_DIELECTRIC: { return mix(values[1], values[0], dielectric_reflected(m, wi)); }

@@ -72,12 +72,8 @@ fn leaf_at(root: u32, s: Surface, wi: vec3<f32>, number: u32, u: ptr<function, f
             leaf.chance *= select(1.0 - p, p, in_second);
             leaf.model = select(models[m].first, models[m].second, in_second);
         } else {
-            var n = value * 2.0 - 1.0;
-            if kind == BUMP_MAP {
-                n = bump_normal(m, s, s.frame);
-            }
-            let tilt = tilt_of(n, leaf.wi);
-            leaf.steepness = min(0.125 * dot(tilt.n.xy, tilt.n.xy) / (tilt.n.z * tilt.n.z), 1.0);
+            let tilt = tilt_of(tilted_normal(m, s, value), leaf.wi);
+            leaf.steepness = steepness_of(tilt.n);
             leaf.axes = Frame(to_world(leaf.axes, tilt.s), to_world(leaf.axes, tilt.t), to_world(leaf.axes, tilt.n));
             leaf.wi = to_local(tilt, leaf.wi);
             leaf.model = models[m].first;
@@ -113,18 +109,27 @@ fn leaf_lit(leaf: Leaf, wo: vec3<f32>) -> f32 {
     return select(0.0, tilt_shadowing(leaf.steepness, wo), together);
 }
 
+// Squared alpha of the shadowing over bumps as rough as the tilt is steep.
+fn steepness_of(n: vec3<f32>) -> f32 {
+    return min(0.125 * dot(n.xy, n.xy) / (n.z * n.z), 1.0);
+}
+
 fn tilt_shadowing(steepness: f32, wo: vec3<f32>) -> f32 {
     let cosine = abs(wo.z);
     return 2.0 * cosine / (cosine + sqrt(cosine * cosine + steepness * dot(wo.xy, wo.xy)));
 }
 
-fn bump_normal(m: u32, s: Surface, frame: Frame) -> vec3<f32> {
+// The normal of a bump or normal map whose texture says `value`, in the surface's shading frame, of any length.
+fn tilted_normal(m: u32, s: Surface, value: vec3<f32>) -> vec3<f32> {
+    if models[m].kind == NORMAL_MAP {
+        return value * 2.0 - 1.0;
+    }
     let slope = models[m].a * height_gradient(models[m].textures[0], s.uv);
-    let n = frame.n;
+    let n = s.frame.n;
     let du = s.dp_du + n * (slope.x - dot(n, s.dp_du));
     let dv = s.dp_dv + n * (slope.y - dot(n, s.dp_dv));
     let tilted = cross(du, dv);
-    return to_local(frame, select(tilted, -tilted, dot(s.ng, tilted) < 0.0));
+    return to_local(s.frame, select(tilted, -tilted, dot(s.ng, tilted) < 0.0));
 }
 
 // Change of a texture's luminance with u and v.
@@ -247,17 +252,13 @@ fn bsdf_diffuse_in(s: Surface, towards_light: vec3<f32>) -> f32 {
             }
             m = select(models[m].second, models[m].first, only == 0u);
         } else {
-            var n = texture_eval(models[m].textures[0], s.uv) * 2.0 - 1.0;
-            if kind == BUMP_MAP {
-                n = bump_normal(m, s, s.frame);
-            }
-            let tilt = tilt_of(n, vec3(0.0, 0.0, sign_of(wo.z)));
+            let value = texture_eval(models[m].textures[0], s.uv);
+            let tilt = tilt_of(tilted_normal(m, s, value), vec3(0.0, 0.0, sign_of(wo.z)));
             let light = to_local(tilt, wo);
             if light.z * wo.z <= 0.0 {
                 return 0.0;
             }
-            let steepness = min(0.125 * dot(tilt.n.xy, tilt.n.xy) / (tilt.n.z * tilt.n.z), 1.0);
-            factor *= tilt_shadowing(steepness, wo) * (light.z / wo.z);
+            factor *= tilt_shadowing(steepness_of(tilt.n), wo) * (light.z / wo.z);
             wo = light;
             m = models[m].first;
         }

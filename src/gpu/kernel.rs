@@ -106,6 +106,14 @@ impl Gpu {
         self.queue.submit([encoder.finish()]);
     }
 
+    /// Buffers as the bindings of a group, numbered from 0.
+    pub(super) fn group(&self, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
+        let bindings = buffers.iter().enumerate();
+        let entries: Vec<_> =
+            bindings.map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() }).collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+    }
+
     /// Hands a kernel's run on `groups` workgroups to the device.
     pub(super) fn submit(
         &self,
@@ -114,11 +122,7 @@ impl Gpu {
         groups: [u32; 2],
         timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
     ) {
-        let bindings = buffers.iter().enumerate();
-        let entries: Vec<_> =
-            bindings.map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() }).collect();
-        let layout = &kernel.pipeline.get_bind_group_layout(0);
-        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries });
+        let group = self.group(&kernel.pipeline.get_bind_group_layout(0), buffers);
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
         pass.set_pipeline(&kernel.pipeline);

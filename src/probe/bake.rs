@@ -7,6 +7,7 @@ use crate::gpu::{PathStart, ProbePaths, SampleSum};
 use crate::lightmap::LightMap;
 use crate::math::{Rgb, hash_words, luminance};
 use crate::progress::Progress;
+use crate::render::gbuffer::is_glossy;
 use crate::render::mirror::mirror_hit;
 use crate::transport::bsdf::{Lobes, Query};
 use crate::transport::path::{KnownDiffuse, PathParams, scattered};
@@ -71,12 +72,6 @@ pub fn probe_geometry(world: &World, position: Vec3, map: ParameterMap) -> Probe
 fn direction(map: &ParameterMap, texel: u32, offset: Vec2) -> Vec3 {
     let width = map.size[0];
     map.direction_from_texel(Vec2::new((texel % width) as f32, (texel / width) as f32) + offset)
-}
-
-/// Whether a view of `surface` from `wo` has a lobe for the probe to store.
-pub fn is_glossy(world: &World, surface: &Surface, wo: Vec3) -> bool {
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
-    bsdf.lobes().contains(Lobes::NON_DIFFUSE) && (bsdf.is_two_sided() || surface.frame.n.dot(wo) > 0.0)
 }
 
 /// What all probes of a bake share.

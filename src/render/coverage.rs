@@ -5,14 +5,13 @@
 //! alias. More rays through all passes cure it (three quarters of the error at 4 x 4 in place of 2 x 2), at four times the price; these are
 //! asked only what they see, and only where it matters. Emission and the diffuse layer are the rays' own.
 
-use super::gbuffer::{GBuffer, Pixel, pixel};
-use super::mirror::{Reflected, mirror_hit};
+use super::gbuffer::{GBuffer, Pixel, view_alpha};
+use super::mirror::{Reflected, facing_normal, mirror_hit};
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::scene::Camera;
-use crate::surface::CurvatureMap;
 use crate::transport::World;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -63,10 +62,42 @@ pub struct Covered {
     pub glossy: Rgb,
 }
 
+/// What decides whether two rays see the same.
+struct Seen {
+    p: Vec3,
+    normal: Vec3,
+    depth: f32,
+    alpha: Option<f32>,
+    material: u32,
+}
+
+impl Seen {
+    fn of(p: &Pixel) -> Self {
+        let Pixel { surface, normal, depth, alpha, .. } = *p;
+        Self { p: surface.p, normal, depth, alpha, material: surface.material }
+    }
+
+    fn is_sharp(&self) -> bool {
+        self.alpha.is_some_and(|alpha| alpha <= SHARP_ALPHA)
+    }
+
+    fn same_surface(&self, other: &Self) -> bool {
+        self.material == other.material
+            && self.normal.dot(other.normal) > MIN_NORMAL_COS
+            // Along a plane seen at a grazing angle depth changes quickly: its distance from the other's plane is what counts.
+            && self.normal.dot(other.p - self.p).abs() < DEPTH_TOLERANCE * self.depth
+    }
+
+    /// Whether two mirror hits, `a` from here, are the same; of no account where the surface is rough.
+    fn same_reflected(&self, a: &Reflected, b: &Reflected) -> bool {
+        let reach = if a.is_sky() { 1.0 } else { a.point.distance(self.p) + self.depth };
+        !self.is_sharp() || (a.material == b.material && a.point.distance(b.point) < REFLECTED_TOLERANCE * reach)
+    }
+}
+
 /// Pixels across which an edge runs, by index, with their layers. `camera` is the view's at the frame's size.
 pub fn covered_pixels(
     world: &World,
-    curvature: &CurvatureMap,
     lightmap: Option<&LightMap>,
     camera: &Camera,
     sub: &SubPixels,
@@ -91,13 +122,14 @@ pub fn covered_pixels(
                 sum.emission += world.lights.environment(ray.d);
                 continue;
             };
-            let seen = pixel(world, curvature, surface, -ray.d);
-            sum.emission += seen.emission;
-            sum.diffuse += lightmap.map_or(Rgb::ZERO, |map| map.diffuse_radiance(&world.scene, &surface, seen.wo));
-            if let Some(alpha) = seen.alpha {
-                let mirrored = (alpha <= SHARP_ALPHA).then(|| mirror_hit(world, &surface, seen.wo));
-                sum.glossy += glossy_of(sub, &window, &seen, mirrored.as_ref(), at * sub.n as f32);
-            }
+            let wo = -ray.d;
+            sum.emission += world.lights.emitted(&world.scene, &surface, wo);
+            sum.diffuse += lightmap.map_or(Rgb::ZERO, |map| map.diffuse_radiance(&world.scene, &surface, wo));
+            let Some(alpha) = view_alpha(world, &surface, wo) else { continue };
+            let (p, normal) = (surface.p, facing_normal(&surface, wo));
+            let seen = Seen { p, normal, depth: surface.t, alpha: Some(alpha), material: surface.material };
+            let mirrored = if seen.is_sharp() { mirror_hit(world, &surface, wo) } else { Reflected::NONE };
+            sum.glossy += glossy_of(sub, &window, &seen, &mirrored, at * sub.n as f32);
         }
         let scale = 1.0 / (rays * rays) as f32;
         Some((i, Covered { emission: sum.emission * scale, diffuse: sum.diffuse * scale, glossy: sum.glossy * scale }))
@@ -113,46 +145,27 @@ fn window(sub: &SubPixels, [x, y]: [usize; 2]) -> Vec<usize> {
 }
 
 fn has_edge(sub: &SubPixels, window: &[usize]) -> bool {
-    let all = window.iter().map(|&i| (&sub.view.pixels[i], &sub.reflected[i]));
-    let Some((first, mirrored)) = all.clone().next() else { return false };
-    let apart = |(other, reflected): (&Option<Pixel>, &Reflected)| match (first, other) {
+    let seen = |i: usize| sub.view.pixels[i].as_ref().map(Seen::of);
+    let Some((&first, rest)) = window.split_first() else { return false };
+    let (a, mirrored) = (seen(first), &sub.reflected[first]);
+    rest.iter().any(|&i| match (&a, &seen(i)) {
         (None, None) => false,
-        (Some(a), Some(b)) => !(same_surface(a, b) && (is_rough(a) || same_reflected(a, mirrored, reflected))),
+        (Some(a), Some(b)) => !(a.same_surface(b) && a.same_reflected(mirrored, &sub.reflected[i])),
         _ => true,
-    };
-    all.skip(1).any(apart)
-}
-
-fn is_rough(p: &Pixel) -> bool {
-    p.alpha.is_none_or(|alpha| alpha > SHARP_ALPHA)
-}
-
-fn same_surface(a: &Pixel, b: &Pixel) -> bool {
-    a.surface.material == b.surface.material
-        && a.normal.dot(b.normal) > MIN_NORMAL_COS
-        // Along a plane seen at a grazing angle depth changes quickly: its distance from the other's plane is what counts.
-        && (a.normal.dot(b.surface.p - a.surface.p)).abs() < DEPTH_TOLERANCE * a.depth
-}
-
-fn same_reflected(from: &Pixel, a: &Reflected, b: &Reflected) -> bool {
-    let reach = if a.is_sky() { 1.0 } else { a.point.distance(from.surface.p) + from.depth };
-    a.material == b.material && a.point.distance(b.point) < REFLECTED_TOLERANCE * reach
+    })
 }
 
 /// The glossy radiance of what a ray at `at` (sub-pixels) sees: that of the sub-pixels that show the same, the nearest most.
-fn glossy_of(sub: &SubPixels, window: &[usize], seen: &Pixel, mirrored: Option<&Reflected>, at: Vec2) -> Rgb {
+fn glossy_of(sub: &SubPixels, window: &[usize], seen: &Seen, mirrored: &Reflected, at: Vec2) -> Rgb {
     let width = sub.view.size()[0];
     // Same surface and reflection; same surface; whatever is nearest.
     let mut best = [(Rgb::ZERO, 0.0f32); 3];
     for &i in window {
-        let Some(other) = &sub.view.pixels[i] else { continue };
-        if other.alpha.is_none() {
-            continue;
-        }
+        let Some(other) = sub.view.pixels[i].as_ref().filter(|p| p.alpha.is_some()) else { continue };
         let centre = Vec2::new((i % width) as f32, (i / width) as f32) + 0.5;
         let weight = 1.0 / (centre.distance_squared(at) + 0.1);
-        let surface = same_surface(seen, other);
-        let reflection = surface && mirrored.is_none_or(|m| same_reflected(seen, m, &sub.reflected[i]));
+        let surface = seen.same_surface(&Seen::of(other));
+        let reflection = surface && seen.same_reflected(mirrored, &sub.reflected[i]);
         for (k, counts) in [reflection, surface, true].into_iter().enumerate() {
             if counts {
                 best[k].0 += sub.glossy[i] * weight;

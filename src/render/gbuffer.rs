@@ -64,18 +64,27 @@ pub fn gbuffer(world: &World, curvature: &CurvatureMap, camera: &Camera) -> GBuf
     GBuffer { camera: camera.clone(), pixels, background }
 }
 
-/// What is known of a pixel that sees `surface` from `wo`.
-pub fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) -> Pixel {
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) -> Pixel {
     let normal = facing_normal(&surface, wo);
-    let has_glossy = bsdf.lobes().contains(Lobes::NON_DIFFUSE) && (bsdf.is_two_sided() || surface.frame.n.dot(wo) > 0.0);
     Pixel {
         surface,
         wo,
         normal,
         depth: surface.t,
-        alpha: if has_glossy { bsdf.alpha(&surface) } else { None },
+        alpha: view_alpha(world, &surface, wo),
         curvature: curvature.at(&world.scene.geometry, surface.triangle, surface.barycentric, normal),
         emission: world.lights.emitted(&world.scene, &surface, wo),
     }
+}
+
+/// Microfacet alpha of the lobe that a view of `surface` from `wo` asks the probes for; `None` where it has none.
+pub fn view_alpha(world: &World, surface: &Surface, wo: Vec3) -> Option<f32> {
+    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    if is_glossy(world, surface, wo) { bsdf.alpha(surface) } else { None }
+}
+
+/// Whether a view of `surface` from `wo` has a lobe for a probe to store.
+pub fn is_glossy(world: &World, surface: &Surface, wo: Vec3) -> bool {
+    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    bsdf.lobes().contains(Lobes::NON_DIFFUSE) && (bsdf.is_two_sided() || surface.frame.n.dot(wo) > 0.0)
 }

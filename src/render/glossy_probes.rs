@@ -170,7 +170,7 @@ impl<'a> Renderer<'a> {
         let mut layers = [&emission, &diffuse, &glossy].map(|layer| downsample(layer, size, n as usize));
         clock.lap("composite");
         let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
-        for (i, c) in covered_pixels(self.world, self.curvature, self.lightmap, camera, &sub, &self.params.coverage) {
+        for (i, c) in covered_pixels(self.world, self.lightmap, camera, &sub, &self.params.coverage) {
             for (layer, value) in layers.iter_mut().zip([c.emission, c.diffuse, c.glossy]) {
                 layer[i] = value;
             }

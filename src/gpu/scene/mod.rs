@@ -222,10 +222,8 @@ fn group(
     let params = gpu.upload("the scene's parameters", bytemuck::bytes_of(&params))?;
     let texels = gpu.upload("the light map", cast_slice(light_texels))?;
     let corners = gpu.upload("the light map's charts", cast_slice(light_corners))?;
-    let buffers = fixed.iter().chain([&params, &texels, &corners]).enumerate();
-    let entries: Vec<_> =
-        buffers.map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() }).collect();
-    gpu.checked(|| gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("scene"), layout, entries: &entries }))
+    let buffers: Vec<_> = fixed.iter().chain([&params, &texels, &corners]).collect();
+    gpu.checked(|| gpu.group(layout, &buffers))
 }
 
 /// The compressed tree, and three vectors a primitive: the bits of its corners, with the triangle, its material if that lets rays through,
