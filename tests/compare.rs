@@ -114,3 +114,25 @@ fn what_does_not_fit_together_is_refused_with_both_names() {
     assert!(text.contains("\"glossy.R\" is missing"), "{text}");
     assert!(!out.exists(), "nothing is written for inputs that are refused");
 }
+
+#[test]
+fn a_second_reference_takes_the_noise_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let [a, b, c, out] = ["a.exr", "b.exr", "c.exr", "out"].map(|n| dir.path().join(n));
+    // Opposite errors of the references: as much noise as can be, and none in common.
+    write(&a, [12, 11], 0.5);
+    write(&b, [12, 11], 0.45);
+    write(&c, [12, 11], 0.55);
+    let second = c.to_string_lossy();
+    let output = compare(&a, &b, &out, &["--second-reference", &second, "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let json: Value = serde_json::from_slice(&std::fs::read(out.join("metrics.json")).unwrap()).unwrap();
+    assert!(json["mean"]["rmse_rgb"].as_f64().unwrap() > 0.02);
+    assert_eq!(json["without_noise"]["rmse_rgb"], 0.0);
+    assert_eq!(json["frames"][0]["without_noise"], json["without_noise"]);
+    assert_eq!(json["provenance"]["inputs"].as_object().unwrap().len(), 3);
+
+    let same = b.to_string_lossy();
+    let text = message(&compare(&a, &b, &out, &["--second-reference", &same]));
+    assert!(text.contains("another seed"), "{text}");
+}

@@ -9,6 +9,7 @@ pub mod report;
 pub mod rmse;
 pub mod ssim;
 pub mod temporal;
+pub mod without_noise;
 
 use crate::math::Rgb;
 use rayon::prelude::*;

@@ -1,5 +1,6 @@
 //! `metrics.json` and `index.html`: the numbers for programs, and a page that shows frames, reference and error side by side.
 
+use super::without_noise::WithoutNoise;
 use super::{Comparison, Metrics, Raster, flip};
 use crate::io::Provenance;
 use crate::{Error, Result};
@@ -13,6 +14,9 @@ pub struct Report {
     pub frames: Vec<FrameMetrics>,
     /// Mean over frames of each number.
     pub mean: Metrics,
+    /// Means without the reference's noise, where there are two references.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without_noise: Option<WithoutNoise>,
     /// Where the numbers came from.
     pub provenance: Provenance,
 }
@@ -25,13 +29,17 @@ pub struct FrameMetrics {
     /// Its numbers.
     #[serde(flatten)]
     pub metrics: Metrics,
+    /// Its numbers without the reference's noise, where there are two references.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without_noise: Option<WithoutNoise>,
 }
 
 impl Report {
     /// The report of `frames`, in order of name.
     pub fn new(frames: Vec<FrameMetrics>, provenance: Provenance) -> Self {
         let all: Vec<Metrics> = frames.iter().map(|f| f.metrics).collect();
-        Self { mean: Metrics::mean(&all), frames, provenance }
+        let without: Option<Vec<WithoutNoise>> = frames.iter().map(|f| f.without_noise).collect();
+        Self { mean: Metrics::mean(&all), without_noise: without.map(|w| WithoutNoise::mean(&w)), frames, provenance }
     }
 
     /// The table for a terminal, a line a frame and one for the mean.
@@ -47,7 +55,12 @@ impl Report {
         for f in &self.frames {
             text += &line(&f.name, &f.metrics);
         }
-        text + &line("mean", &self.mean)
+        text += &line("mean", &self.mean);
+        if let Some(WithoutNoise { rmse_rgb, rmse_lum, dssim_rgb, dssim_lum, noise_rmse_rgb }) = self.without_noise {
+            let numbers = [rmse_rgb, rmse_lum, dssim_rgb, dssim_lum].map(|x| format!("{x:>11.4}")).concat();
+            text += &format!("mean without the noise of the reference ({noise_rmse_rgb:.4})\n{:width$}{numbers}\n", "");
+        }
+        text
     }
 
     /// `index.html`: one page without outside resources; pictures are beside it, at [`Picture::path`]. `titles` name the
@@ -124,7 +137,11 @@ mod tests {
 
     fn report(names: &[&str]) -> Report {
         let metrics = |i: usize| Metrics { rmse_rgb: i as f64, flip: 0.5, ..Metrics::default() };
-        let frames = names.iter().enumerate().map(|(i, n)| FrameMetrics { name: (*n).into(), metrics: metrics(i) }).collect();
+        let frames = names
+            .iter()
+            .enumerate()
+            .map(|(i, n)| FrameMetrics { name: (*n).into(), metrics: metrics(i), without_noise: None })
+            .collect();
         Report::new(frames, Provenance::new("compare", "", 0, &serde_json::json!({})))
     }
 

@@ -23,12 +23,7 @@ pub struct Ssim {
 
 /// SSIM of two planes of `size` (width, height), values in [0, 1].
 pub fn ssim(a: &[f32], b: &[f32], size: [usize; 2]) -> Ssim {
-    let [width, height] = size;
-    assert!(width >= WINDOW && height >= WINDOW && a.len() == width * height && b.len() == a.len(), "ssim of {size:?}");
-    let blur = |of: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
-        let plane = a.iter().zip(b).map(|(&x, &y)| of(f64::from(x), f64::from(y))).collect();
-        gaussian(plane, size)
-    };
+    let blur = |of: &dyn Fn(f64, f64) -> f64| blur_of(a, b, size, of);
     let (ua, ub) = (blur(&|x, _| x), blur(&|_, y| y));
     let (uaa, ubb, uab) = (blur(&|x, _| x * x), blur(&|_, y| y * y), blur(&|x, y| x * y));
     let similarity = |i: usize| {
@@ -37,10 +32,38 @@ pub fn ssim(a: &[f32], b: &[f32], size: [usize; 2]) -> Ssim {
         structure * (2.0 * ua[i] * ub[i] + C1) / (ua[i] * ua[i] + ub[i] * ub[i] + C1)
     };
     let map: Vec<f64> = (0..a.len()).map(similarity).collect();
+    Ssim { mean: mean_inside(&map, size), map: map.iter().map(|&x| x as f32).collect() }
+}
+
+/// Mean SSIM of a plane to what two noisy ones have in common: their squares are taken as the product of both, in which
+/// independent noise has no mean (in flat windows it may fall below 0, which is let be as far as the quotient allows). The same
+/// plane twice gives [`ssim`]'s mean.
+pub fn ssim_to_pair(a: &[f32], [b, c]: [&[f32]; 2], size: [usize; 2]) -> f64 {
+    let product = |x: &[f32], y: &[f32]| blur_of(x, y, size, &|x, y| x * y);
+    let [ua, ub, uc] = [a, b, c].map(|plane| blur_of(plane, plane, size, &|x, _| x));
+    let (uaa, uab, uac, ubc) = (product(a, a), product(a, b), product(a, c), product(b, c));
+    let similarity = |i: usize| {
+        let (va, vbc) = (uaa[i] - ua[i] * ua[i], (ubc[i] - ub[i] * uc[i]).max(-0.5 * C2));
+        let (vab, vac) = (uab[i] - ua[i] * ub[i], uac[i] - ua[i] * uc[i]);
+        let structure = (vab + vac + C2) / (va + vbc + C2);
+        structure * (ua[i] * (ub[i] + uc[i]) + C1) / (ua[i] * ua[i] + ub[i] * uc[i] + C1)
+    };
+    let map: Vec<f64> = (0..a.len()).map(similarity).collect();
+    mean_inside(&map, size)
+}
+
+/// A function of two planes, pixel by pixel, under the window.
+fn blur_of(a: &[f32], b: &[f32], size: [usize; 2], of: &dyn Fn(f64, f64) -> f64) -> Vec<f64> {
+    let [width, height] = size;
+    assert!(width >= WINDOW && height >= WINDOW && a.len() == width * height && b.len() == a.len(), "ssim of {size:?}");
+    gaussian(a.iter().zip(b).map(|(&x, &y)| of(f64::from(x), f64::from(y))).collect(), size)
+}
+
+/// Mean over the pixels whose window lies inside the image.
+fn mean_inside(map: &[f64], [width, height]: [usize; 2]) -> f64 {
     let rows = RADIUS..height - RADIUS;
     let inside = rows.clone().flat_map(|y| &map[y * width + RADIUS..(y + 1) * width - RADIUS]);
-    let count = rows.len() * (width - 2 * RADIUS);
-    Ssim { mean: inside.sum::<f64>() / count as f64, map: map.iter().map(|&x| x as f32).collect() }
+    inside.sum::<f64>() / (rows.len() * (width - 2 * RADIUS)) as f64
 }
 
 /// Separable Gaussian with mirrored borders.

@@ -5,6 +5,7 @@ use anyhow::{Context, bail};
 use rayon::prelude::*;
 use reprobe::io::{ExrImage, Provenance, atomic};
 use reprobe::metric::report::{FrameMetrics, Picture, Report};
+use reprobe::metric::without_noise::without_noise;
 use reprobe::metric::{Metrics, Raster, compare, ssim};
 use reprobe::progress::Progress;
 use serde::Serialize;
@@ -19,6 +20,10 @@ pub struct Args {
     /// Reference: EXR file, or folder with the same file names
     #[arg(value_name = "B")]
     reference: PathBuf,
+    /// The reference rendered again with another seed, as B: also tells RMSE and DSSIM without the
+    /// references' own noise
+    #[arg(long, value_name = "C")]
+    second_reference: Option<PathBuf>,
     /// Folder for metrics.json, index.html and images/
     #[arg(long, short, value_name = "FOLDER")]
     output: PathBuf,
@@ -48,6 +53,9 @@ struct Pair {
     files: [PathBuf; 2],
 }
 
+/// A measured frame, and the content hashes of its image, its reference and the second reference.
+type Measured = (FrameMetrics, Vec<String>);
+
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     if !(-32.0..=32.0).contains(&args.exposure) {
         bail!("--exposure {}: expected -32 to 32 stops", args.exposure);
@@ -55,7 +63,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let pairs = pairs(&args.image, &args.reference)?;
     let progress = common.progress();
     progress.start("compare", pairs.len() as u64);
-    let frames: Vec<(FrameMetrics, [String; 2])> = pairs
+    let frames: Vec<Measured> = pairs
         .par_iter()
         .enumerate()
         .map(|(i, pair)| {
@@ -71,8 +79,9 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         blake3::hash(all.as_bytes()).to_hex().to_string()
     };
     let parameters = Parameters { layer: &args.layer, exposure: args.exposure };
-    let provenance =
-        Provenance::new("compare", "", common.seed, &parameters).with_input("image", hash(0)).with_input("reference", hash(1));
+    let provenance = Provenance::new("compare", "", common.seed, &parameters);
+    let roles = ["image", "reference", "second-reference"].into_iter().take(frames[0].1.len()).enumerate();
+    let provenance = roles.fold(provenance, |p, (side, role)| p.with_input(role, hash(side)));
     let report = Report::new(frames.into_iter().map(|(frame, _)| frame).collect(), provenance);
     let [a, b] = [&args.image, &args.reference].map(|p| p.display().to_string());
     let page = args.output.join("index.html");
@@ -96,7 +105,9 @@ fn outcome(args: &Args, report: &Report, page: &Path) -> Outcome {
     summary += &format!("see {}", page.display());
     Outcome {
         summary,
-        figures: serde_json::json!({"mean": report.mean, "frames": report.frames, "passed": !check_failed}),
+        figures: serde_json::json!({
+            "mean": report.mean, "without_noise": report.without_noise, "frames": report.frames, "passed": !check_failed
+        }),
         check_failed,
     }
 }
@@ -106,15 +117,26 @@ fn threshold(text: &str) -> Result<f64, String> {
 }
 
 /// Reads, measures and draws one frame.
-fn compare_frame(args: &Args, index: usize, pair: &Pair) -> anyhow::Result<(FrameMetrics, [String; 2])> {
+fn compare_frame(args: &Args, index: usize, pair: &Pair) -> anyhow::Result<Measured> {
     let [fa, fb] = &pair.files;
     let [a, b] = read_pair(fa, fb, &args.layer)?;
     let comparison = compare(&a, &b, args.exposure);
     for picture in Picture::ALL {
         atomic::write(&args.output.join(picture.path(index)), &picture.png(&comparison)?)?;
     }
-    let hashes = [reprobe::io::provenance::hash_file(fa)?, reprobe::io::provenance::hash_file(fb)?];
-    Ok((FrameMetrics { name: pair.name.clone(), metrics: comparison.metrics }, hashes))
+    let mut files = vec![fa.clone(), fb.clone()];
+    let mut frame = FrameMetrics { name: pair.name.clone(), metrics: comparison.metrics, without_noise: None };
+    if let Some(second) = &args.second_reference {
+        let fc = if second.is_dir() { second.join(fb.file_name().unwrap_or_default()) } else { second.clone() };
+        let [_, c] = read_pair(fa, &fc, &args.layer)?;
+        if b == c {
+            bail!("{} has the pixels of {}: expected the reference rendered with another seed", fc.display(), fb.display());
+        }
+        frame.without_noise = Some(without_noise(&a, [&b, &c], args.exposure));
+        files.push(fc);
+    }
+    let hashes = files.iter().map(|f| reprobe::io::provenance::hash_file(f)).collect::<Result<_, _>>()?;
+    Ok((frame, hashes))
 }
 
 /// One layer (`full` for the image itself) of a frame and of its reference, fit to be compared.
