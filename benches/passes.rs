@@ -40,7 +40,7 @@ fn main() {
         .collect();
     let near: Vec<_> = near.iter().map(|(i, probe, weight)| (*i, &**probe, *weight)).collect();
     let mut candidates = NearCandidates::default();
-    let weighted = candidates.of(&world, &near, Some(store.set.roughness_scale));
+    let weighted = candidates.of(&world, &near, Some(store.set.roughness_scale), false);
 
     let view = time("G-buffer", RUNS, || gbuffer(&world, &curvature, &camera));
     let reflected = time("mirror", RUNS, || mirror_pass(&world, &view));

@@ -82,7 +82,7 @@ impl Setup {
     }
 
     fn gather(&self, view: &GBuffer, reflected: &[Reflected], params: &GatherParams) -> Vec<Gathered> {
-        let candidates: Vec<_> = self.probes.iter().map(|p| Candidates::new(&self.world, p, Some(0.5))).collect();
+        let candidates: Vec<_> = self.probes.iter().map(|p| Candidates::new(&self.world, p, Some(0.5), false)).collect();
         let probes = self.probes.iter().zip(&candidates).enumerate();
         let weighted: Vec<_> =
             probes.map(|(index, (probe, candidates))| WeightedProbe { index, probe, candidates, weight: 0.125 }).collect();
@@ -200,7 +200,7 @@ fn coverage_antialiases_edges_and_what_mirrors_show_of_them() {
         let plain = [down(&glossy, n), down(&emission, n)];
         let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
         let mut better = plain.clone();
-        let covered = covered_pixels(&setup.world, None, &camera, &sub, &CoverageParams::default());
+        let covered = covered_pixels(&setup.world, None, false, &camera, &sub, &CoverageParams::default());
         assert!(covered.len() * 2 < better[0].len(), "{} of {} pixels count as edges", covered.len(), better[0].len());
         for (i, pixel) in covered {
             (better[0][i], better[1][i]) = (pixel.glossy, pixel.emission);
@@ -209,7 +209,7 @@ fn coverage_antialiases_edges_and_what_mirrors_show_of_them() {
             let (before, after) = (rmse(&plain[layer], &truth[layer]), rmse(&better[layer], &truth[layer]));
             assert!(after < 0.6 * before, "{name}, {n} x {n}: {before} before, {after} after");
         }
-        assert!(covered_pixels(&setup.world, None, &camera, &sub, &CoverageParams { rays: 0 }).is_empty());
+        assert!(covered_pixels(&setup.world, None, false, &camera, &sub, &CoverageParams { rays: 0 }).is_empty());
     }
 }
 

@@ -88,6 +88,11 @@ impl ExrImage {
             .ok_or_else(|| Error::input(path, format!("channel \"{name}\" is missing (found {})", self.names())))
     }
 
+    /// Whether there is a channel of that name.
+    pub fn has(&self, name: &str) -> bool {
+        self.channels.iter().any(|(n, _)| n == name)
+    }
+
     /// A channel as floats, whatever it is stored as. `path` is for the message.
     pub fn f32(&self, path: &Path, name: &str) -> Result<Vec<f32>> {
         Ok(match self.channel(path, name)? {

@@ -9,6 +9,7 @@ use crate::math::{Rgb, hash_words, luminance};
 use crate::progress::Progress;
 use crate::render::gbuffer::is_glossy;
 use crate::render::mirror::mirror_hit;
+use crate::render::mirror_light::mirror_light;
 use crate::transport::bsdf::{Lobes, Query};
 use crate::transport::path::{KnownDiffuse, PathParams, scattered};
 use crate::transport::{Hit, Ray, Sampler, Surface, World};
@@ -157,11 +158,29 @@ pub fn bake_glossy(
     };
     let mut traced = Traced::default();
     for (centre, sums) in centres.iter().zip(sums) {
-        probe.texels[centre.texel as usize].set_glossy(sums.color / sums.paths as f32);
+        let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
+        let texel = &mut probe.texels[centre.texel as usize];
+        texel.set_glossy(sums.color / sums.paths as f32);
+        texel.set_mirrored(mirrored(bake, centre, wo).unwrap_or(Rgb::ZERO));
         traced.texels += 1;
         traced.paths += u64::from(sums.paths);
     }
     Ok(traced)
+}
+
+impl Bake<'_> {
+    /// Whether texels tell what perfect mirrors show of the light map: where all their paths go through one point, and read that map.
+    pub fn tells_mirrored(&self) -> bool {
+        self.lightmap.is_some() && !self.params.spread
+    }
+}
+
+/// What a texel's perfect mirror shows of the light map's light.
+fn mirrored(bake: &Bake, centre: &Centre, wo: Vec3) -> Option<Rgb> {
+    let map = bake.lightmap.filter(|_| bake.tells_mirrored())?;
+    let surface = bake.world.surface(&centre.hit);
+    let alpha = bake.world.scene.materials[surface.material as usize].bsdf.alpha(&surface)?;
+    (alpha == 0.0).then(|| mirror_light(bake.world, map, &surface, wo).1)
 }
 
 /// The wanted texels whose centres see a glossy surface.

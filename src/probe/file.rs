@@ -1,7 +1,8 @@
 //! A probe: what a point sees in every direction, stored texel by texel (§4.1, Fig. 3), and its file.
 //!
 //! *Paper* (§7.3.4): 24 bytes a texel: glossy colour 6, reflected position and material 8, triangle 4, barycentrics 4, and the
-//! parameterisation with its derivative 8 at half resolution. [`Texel`] holds the first four; [`ParameterMap`] the rest.
+//! parameterisation with its derivative 8 at half resolution. [`Texel`] holds the first four, and 6 of our own for perfect mirrors;
+//! [`ParameterMap`] the rest.
 
 use super::qhmap::ParameterMap;
 use crate::io::{ExrImage, Provenance};
@@ -33,7 +34,8 @@ pub struct Texel {
     pub reflected_material: u16,
     /// Barycentric weights of the reflector triangle's second and third vertex.
     pub barycentric: [f16; 2],
-    padding: u16,
+    /// The part of `glossy` that [`crate::render::mirror_light`] finds, where the reflector is a perfect mirror.
+    pub mirrored: [f16; 3],
     /// The reflector's triangle or [`NO_TRIANGLE`].
     pub triangle: u32,
 }
@@ -45,7 +47,7 @@ impl Texel {
         reflected: [f16::ZERO; 3],
         reflected_material: NOTHING,
         barycentric: [f16::ZERO; 2],
-        padding: 0,
+        mirrored: [f16::ZERO; 3],
         triangle: NO_TRIANGLE,
     };
 
@@ -77,8 +79,22 @@ impl Texel {
 
     /// Sets the glossy radiance, clamped to what a half float holds.
     pub fn set_glossy(&mut self, c: Rgb) {
-        self.glossy = c.min(Rgb::splat(f16::MAX.to_f32())).to_array().map(f16::from_f32);
+        self.glossy = half(c);
     }
+
+    /// What of the glossy radiance a perfect mirror shows of lamps and diffuse light.
+    pub fn mirrored(&self) -> Rgb {
+        Rgb::from_array(self.mirrored.map(f16::to_f32))
+    }
+
+    /// Sets that part, likewise.
+    pub fn set_mirrored(&mut self, c: Rgb) {
+        self.mirrored = half(c);
+    }
+}
+
+fn half(c: Rgb) -> [f16; 3] {
+    c.min(Rgb::splat(f16::MAX.to_f32())).to_array().map(f16::from_f32)
 }
 
 /// A baked probe.
@@ -143,6 +159,9 @@ impl Probe {
             .with_f16("glossy.R", half(&|x| x.glossy[0]))
             .with_f16("glossy.G", half(&|x| x.glossy[1]))
             .with_f16("glossy.B", half(&|x| x.glossy[2]))
+            .with_f16("mirrored.R", half(&|x| x.mirrored[0]))
+            .with_f16("mirrored.G", half(&|x| x.mirrored[1]))
+            .with_f16("mirrored.B", half(&|x| x.mirrored[2]))
             .with_u32("reflector.triangle", t.iter().map(|x| x.triangle).collect())
             .with_f16("reflector.u", half(&|x| x.barycentric[0]))
             .with_f16("reflector.v", half(&|x| x.barycentric[1]))
@@ -164,6 +183,7 @@ impl Probe {
     ) -> Result<Self> {
         let channel = |name: &str| image.f32(path, name);
         let glossy = image.rgb(path, "glossy")?;
+        let mirrored = if image.has("mirrored.R") { Some(image.rgb(path, "mirrored")?) } else { None };
         let triangle = image.u32(path, "reflector.triangle")?;
         let (u, v) = (channel("reflector.u")?, channel("reflector.v")?);
         let (x, y, z) = (channel("reflected.X")?, channel("reflected.Y")?, channel("reflected.Z")?);
@@ -187,6 +207,7 @@ impl Probe {
             let reflected = Reflected { point: Vec3::new(x[i], y[i], z[i]), material };
             let mut texel = Texel::new(triangle[i], Vec2::new(u[i], v[i]), reflected);
             texel.set_glossy(glossy[i]);
+            texel.set_mirrored(mirrored.as_ref().map_or(Rgb::ZERO, |m| m[i]));
             texels.push(texel);
         }
         Ok(Self { position, size: [image.width as u32, image.height as u32], texels, map })
@@ -203,6 +224,9 @@ pub struct BakedSet {
     pub size: [u32; 2],
     /// What alpha was multiplied by at the first vertex (§6.1).
     pub roughness_scale: f32,
+    /// Whether texels that see a perfect mirror tell what of their radiance [`crate::render::mirror_light`] finds.
+    #[serde(default)]
+    pub mirrored: bool,
     /// The views that it serves; `None` serves any.
     pub views: Option<super::wanted::Views>,
     /// blake3 of every probe's file, hex, by index; empty where the views do not use the probe.

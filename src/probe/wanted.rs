@@ -115,7 +115,7 @@ pub fn wanted_texels(
             }
         }
         let near: Vec<_> = near.iter().map(|&(index, weight)| (index, &probes[&index], weight)).collect();
-        let weighted = candidates.of(world, &near, None);
+        let weighted = candidates.of(world, &near, None, false);
         let fine = Camera { size: camera.size.map(|s| s * views.supersample), ..camera.clone() };
         let view = gbuffer(world, curvature, &fine);
         let reflected = mirror_pass(world, &view);

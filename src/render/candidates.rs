@@ -68,8 +68,9 @@ pub struct Light {
 }
 
 impl Candidates {
-    /// The candidates of a probe; with albedos where the scale of roughness that it was baked at is given.
-    pub fn new(world: &World, probe: &Probe, roughness_scale: Option<f32>) -> Self {
+    /// The candidates of a probe; with albedos where the scale of roughness that it was baked at is given; without the light that perfect
+    /// mirrors show, where the view looks for that itself (`mirror_light`).
+    pub fn new(world: &World, probe: &Probe, roughness_scale: Option<f32>, mirror_light: bool) -> Self {
         let width = probe.size[0] as usize;
         let rows = || probe.texels.par_iter().with_min_len(width);
         let reflectors: Vec<_> = rows().map(|texel| reflector(world, texel, probe.position)).collect();
@@ -87,7 +88,7 @@ impl Candidates {
             let albedo =
                 if r.is_some() { roughness_scale.map(|scale| albedo(world, texel, probe.position, scale)) } else { None };
             Light {
-                glossy: texel.glossy(),
+                glossy: if mirror_light { texel.glossy() - texel.mirrored() } else { texel.glossy() },
                 albedo: albedo.unwrap_or(Rgb::ONE),
                 reflected_material: u32::from(texel.reflected_material),
                 object: r.as_ref().map_or(u32::MAX, |r| r.object),
@@ -141,16 +142,17 @@ pub struct NearCandidates(BTreeMap<usize, Candidates>);
 
 impl NearCandidates {
     /// The probes `near` the camera (index, probe, weight), ready for the gather. Makes the candidates that are missing, and drops
-    /// those of all other probes. Always to be called with the same `roughness_scale`: [`Candidates::new`]'s.
+    /// those of all other probes. Always to be called with the same `roughness_scale` and `mirror_light`: [`Candidates::new`]'s.
     pub fn of<'a>(
         &'a mut self,
         world: &World,
         near: &[(usize, &'a Probe, f32)],
         roughness_scale: Option<f32>,
+        mirror_light: bool,
     ) -> Vec<WeightedProbe<'a>> {
         self.0.retain(|index, _| near.iter().any(|(i, ..)| i == index));
         for &(index, probe, _) in near {
-            self.0.entry(index).or_insert_with(|| Candidates::new(world, probe, roughness_scale));
+            self.0.entry(index).or_insert_with(|| Candidates::new(world, probe, roughness_scale, mirror_light));
         }
         let of = |&(index, probe, weight)| WeightedProbe { index, probe, candidates: &self.0[&index], weight };
         near.iter().map(of).collect()

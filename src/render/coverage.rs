@@ -7,10 +7,11 @@
 
 use super::gbuffer::{GBuffer, Pixel, view_alpha};
 use super::mirror::{Reflected, facing_normal, mirror_hit};
+use super::mirror_light::mirror_light;
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::scene::Camera;
-use crate::transport::World;
+use crate::transport::{Ray, World};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -95,46 +96,76 @@ impl Seen {
     }
 }
 
-/// Pixels across which an edge runs, by index, with their layers. `camera` is the view's at the frame's size.
+/// Pixels across which an edge runs, by index, with their layers. `camera` is the view's at the frame's size; `mirrors` says that the
+/// sub-pixels' glossy radiance lacks [`super::mirror_light`]'s.
 pub fn covered_pixels(
     world: &World,
     lightmap: Option<&LightMap>,
+    mirrors: bool,
     camera: &Camera,
     sub: &SubPixels,
     params: &CoverageParams,
 ) -> Vec<(usize, Covered)> {
     let [width, height] = camera.size.map(|s| s as usize);
-    let rays = params.rays as usize;
-    if rays == 0 {
-        return Vec::new();
-    }
+    let scene = Lit { world, lightmap, mirrors };
     let of = |i: usize| {
         let window = window(sub, [i % width, i / width]);
-        if !has_edge(sub, &window) {
+        if params.rays == 0 || !has_edge(sub, &window) {
             return None;
         }
+        let corner = Vec2::new((i % width) as f32, (i / width) as f32);
+        let rays = params.rays * params.rays;
         let mut sum = Covered::default();
-        for k in 0..rays * rays {
-            let offset = (Vec2::new((k % rays) as f32, (k / rays) as f32) + 0.5) / rays as f32;
-            let at = Vec2::new((i % width) as f32, (i / width) as f32) + offset;
-            let ray = camera.ray(at, Vec2::splat(0.5));
-            let Some(surface) = world.intersect(&ray) else {
-                sum.emission += world.lights.environment(ray.d);
-                continue;
-            };
-            let wo = -ray.d;
-            sum.emission += world.lights.emitted(&world.scene, &surface, wo);
-            sum.diffuse += lightmap.map_or(Rgb::ZERO, |map| map.diffuse_radiance(&world.scene, &surface, wo));
-            let Some(alpha) = view_alpha(world, &surface, wo) else { continue };
-            let (p, normal) = (surface.p, facing_normal(&surface, wo));
-            let seen = Seen { p, normal, depth: surface.t, alpha: Some(alpha), material: surface.material };
-            let mirrored = if seen.is_sharp() { mirror_hit(world, &surface, wo) } else { Reflected::NONE };
-            sum.glossy += glossy_of(sub, &window, &seen, &mirrored, at * sub.n as f32);
+        for k in 0..rays {
+            let at = corner + lattice_point(k, rays);
+            let seen = scene.along(&camera.ray(at, Vec2::splat(0.5)), sub, &window, at * sub.n as f32);
+            sum.emission += seen.emission;
+            sum.diffuse += seen.diffuse;
+            sum.glossy += seen.glossy;
         }
-        let scale = 1.0 / (rays * rays) as f32;
-        Some((i, Covered { emission: sum.emission * scale, diffuse: sum.diffuse * scale, glossy: sum.glossy * scale }))
+        let scale = 1.0 / rays as f32;
+        let glossy = (sum.glossy * scale).max(Rgb::ZERO);
+        Some((i, Covered { emission: sum.emission * scale, diffuse: sum.diffuse * scale, glossy }))
     };
     (0..width * height).into_par_iter().with_min_len(width).filter_map(of).collect()
+}
+
+/// Point `k` of `n` in the unit square: a lattice of the golden ratio, whose points lie in as many columns and rows as there are points.
+/// (Along a bar that is nearly upright, a grid of 4 x 4 has but four columns to tell its width by.)
+fn lattice_point(k: u32, n: u32) -> Vec2 {
+    const GOLDEN: f32 = 0.618_034;
+    Vec2::new((k as f32 + 0.5) / n as f32, (k as f32 * GOLDEN + 0.5).fract())
+}
+
+/// A scene and its light.
+struct Lit<'a> {
+    world: &'a World,
+    lightmap: Option<&'a LightMap>,
+    mirrors: bool,
+}
+
+impl Lit<'_> {
+    /// What a ray through `at` (sub-pixels) shows.
+    fn along(&self, ray: &Ray, sub: &SubPixels, window: &[usize], at: Vec2) -> Covered {
+        let Self { world, lightmap, mirrors } = *self;
+        let Some(surface) = world.intersect(ray) else {
+            return Covered { emission: world.lights.environment(ray.d), ..Covered::default() };
+        };
+        let wo = -ray.d;
+        let emission = world.lights.emitted(&world.scene, &surface, wo);
+        let diffuse = lightmap.map_or(Rgb::ZERO, |map| map.diffuse_radiance(&world.scene, &surface, wo));
+        let Some(alpha) = view_alpha(world, &surface, wo) else {
+            return Covered { emission, diffuse, glossy: Rgb::ZERO };
+        };
+        let (p, normal) = (surface.p, facing_normal(&surface, wo));
+        let seen = Seen { p, normal, depth: surface.t, alpha: Some(alpha), material: surface.material };
+        let (mirrored, light) = match lightmap.filter(|_| mirrors && alpha == 0.0) {
+            Some(map) => mirror_light(world, map, &surface, wo),
+            None if seen.is_sharp() => (mirror_hit(world, &surface, wo), Rgb::ZERO),
+            None => (Reflected::NONE, Rgb::ZERO),
+        };
+        Covered { emission, diffuse, glossy: light + glossy_of(sub, window, &seen, &mirrored, at) }
+    }
 }
 
 /// The sub-pixels of a pixel and those around it.

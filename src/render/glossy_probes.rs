@@ -8,6 +8,7 @@ use super::footprint::{Footprint, FootprintParams, GlossyPoint};
 use super::gather::{GatherParams, Gathered, gather};
 use super::gbuffer::{GBuffer, Pixel, gbuffer};
 use super::mirror::{Reflected, mirror_pass};
+use super::mirror_light::{add_mirrored, mirror_light_pass};
 use crate::Result;
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
@@ -30,6 +31,9 @@ pub struct GlossyProbeParams {
     pub supersample: u32,
     /// §5.2.
     pub gather: GatherParams,
+    /// Perfect mirrors take the light that the light map knows along the mirror ray, and the rest from probes. *Ours*; the paper takes
+    /// all from probes.
+    pub mirror_light: bool,
     /// §6.1; `None` leaves the gathered colours unfiltered.
     pub footprint: Option<FootprintParams>,
     /// §6.2, §6.3.
@@ -43,6 +47,7 @@ impl Default for GlossyProbeParams {
         Self {
             supersample: 1,
             gather: GatherParams::default(),
+            mirror_light: true,
             footprint: Some(FootprintParams::default()),
             filter: FilterParams::default(),
             coverage: CoverageParams::default(),
@@ -56,6 +61,7 @@ impl GlossyProbeParams {
         Self {
             supersample: 1,
             gather: GatherParams::paper(),
+            mirror_light: false,
             footprint: Some(FootprintParams::paper()),
             filter: FilterParams::paper(),
             coverage: CoverageParams { rays: 0 },
@@ -146,7 +152,8 @@ impl<'a> Renderer<'a> {
         let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
         let roughness_scale = probes.set.roughness_scale;
         let albedos = self.params.gather.albedo_ratio.then_some(roughness_scale);
-        let weighted = self.candidates.of(self.world, &near, albedos);
+        let mirrors = self.lightmap.filter(|_| self.params.mirror_light && probes.set.mirrored);
+        let weighted = self.candidates.of(self.world, &near, albedos, mirrors.is_some());
         clock.lap("load");
         let view = Arc::new(gbuffer(self.world, self.curvature, &fine));
         clock.lap("gbuffer");
@@ -162,15 +169,19 @@ impl<'a> Renderer<'a> {
         clock.lap("footprint");
         let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter);
         clock.lap("filter");
+        let mirrored = mirrors.map(|map| mirror_light_pass(self.world, map, &view));
+        clock.lap("mirror");
         let diffuse = match self.lightmap {
             Some(map) => diffuse_layer(&self.world.scene, &view, map),
             None => vec![Rgb::ZERO; glossy.len()],
         };
         let emission = emission_layer(&view);
-        let mut layers = [&emission, &diffuse, &glossy].map(|layer| downsample(layer, size, n as usize));
+        let whole = mirrored.as_ref().map(|mirrored| add_mirrored(&glossy, mirrored));
+        let mut layers =
+            [&emission, &diffuse, whole.as_ref().unwrap_or(&glossy)].map(|layer| downsample(layer, size, n as usize));
         clock.lap("composite");
         let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
-        for (i, c) in covered_pixels(self.world, self.lightmap, camera, &sub, &self.params.coverage) {
+        for (i, c) in covered_pixels(self.world, self.lightmap, mirrored.is_some(), camera, &sub, &self.params.coverage) {
             for (layer, value) in layers.iter_mut().zip([c.emission, c.diffuse, c.glossy]) {
                 layer[i] = value;
             }

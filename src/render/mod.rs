@@ -13,5 +13,6 @@ pub mod gbuffer;
 pub mod glossy_probes;
 pub mod inspect;
 pub mod mirror;
+pub mod mirror_light;
 pub mod path_trace;
 pub mod perturb;

@@ -183,6 +183,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
         let set = BakedSet {
             size: maps.size,
             roughness_scale: params.roughness_scale,
+            mirrored: shared.tells_mirrored(),
             views,
             files: files.collect::<Result<_, _>>()?,
             provenance,

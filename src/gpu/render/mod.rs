@@ -206,7 +206,7 @@ impl<'a> Renderer<'a> {
         self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, albedos)?;
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
-        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos);
+        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos, false);
         for (index, weight) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
             clock.restart();
             let probe = probes.probe(index)?;
