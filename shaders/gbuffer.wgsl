@@ -106,8 +106,36 @@ fn gbuffer(@builtin(global_invocation_id) id: vec3<u32>) {
     out_emission[i] = vec4(emission, 0.0);
 }
 
-// Light that the diffuse lobe sends to the camera, by the light map, and the glossy lobe's directional albedo. Twins:
-// lightmap::LightMap::diffuse_radiance and render::gather::view_albedo.
+// What the view from direction `wi` (local) sees of both lobes.
+struct Factors {
+    // Radiance of the diffuse lobe, by the light map. Twin: lightmap::LightMap::diffuse_radiance.
+    diffuse: vec3<f32>,
+    // Directional albedo of the glossy lobes; 0 where the scale of their roughness is negative.
+    albedo: vec3<f32>,
+}
+
+fn factors_of(s: Surface, wi: vec3<f32>, roughness_scale: f32) -> Factors {
+    let root = materials[s.material].model;
+    var sum = Factors(vec3(0.0), vec3(0.0));
+    var u = 0.0;
+    for (var k = 0u; k < models[root].leaves; k++) {
+        let leaf = leaf_at(root, s, wi, k, &u, ALL_LOBES);
+        if leaf.share > 0.0 {
+            sum.diffuse += leaf.share * leaf_diffuse_out(leaf);
+            if roughness_scale >= 0.0 {
+                sum.albedo += leaf.share * leaf_glossy_albedo(leaf.model, leaf.wi, Query(NON_DIFFUSE, roughness_scale));
+            }
+        }
+    }
+    if scene.light_width > 0u && any(sum.diffuse != vec3(0.0)) {
+        sum.diffuse *= lightmap_lookup(s.triangle, s.barycentric, wi.z < 0.0) * FRAC_1_PI;
+    } else {
+        sum.diffuse = vec3(0.0);
+    }
+    return sum;
+}
+
+// Light that the diffuse lobe sends to the camera, and the glossy lobe's directional albedo. Twin: render::gather::view_albedo.
 @compute @workgroup_size(8, 8)
 fn view_factors(@builtin(global_invocation_id) id: vec3<u32>) {
     let camera = params.camera;
@@ -115,30 +143,13 @@ fn view_factors(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let i = id.y * camera.width + id.x;
-    var diffuse = vec3(0.0);
-    var albedo = vec3(0.0);
+    var factors = Factors(vec3(0.0), vec3(0.0));
     if hits[i].triangle != NO_TRIANGLE {
         let ray = camera_ray(camera, vec2<f32>(id.xy) + 0.5, vec2(0.5));
         let s = surface_at(hits[i]);
-        let wi = to_local(s.frame, -ray.direction);
-        let root = materials[s.material].model;
-        let wants_albedo = glossy_materials[i] != NOT_GLOSSY && params.roughness_scale >= 0.0;
-        var u = 0.0;
-        for (var k = 0u; k < models[root].leaves; k++) {
-            let leaf = leaf_at(root, s, wi, k, &u, ALL_LOBES);
-            if leaf.share > 0.0 {
-                diffuse += leaf.share * leaf_diffuse_out(leaf);
-                if wants_albedo {
-                    albedo += leaf.share * leaf_glossy_albedo(leaf.model, leaf.wi, Query(NON_DIFFUSE, params.roughness_scale));
-                }
-            }
-        }
-        if scene.light_width > 0u && any(diffuse != vec3(0.0)) {
-            diffuse *= lightmap_lookup(s.triangle, s.barycentric, wi.z < 0.0) * FRAC_1_PI;
-        } else {
-            diffuse = vec3(0.0);
-        }
+        let wants_albedo = glossy_materials[i] != NOT_GLOSSY;
+        factors = factors_of(s, to_local(s.frame, -ray.direction), select(-1.0, params.roughness_scale, wants_albedo));
     }
-    out_diffuse[i] = vec4(diffuse, 0.0);
-    out_albedos[i] = vec4(albedo, 0.0);
+    out_diffuse[i] = vec4(factors.diffuse, 0.0);
+    out_albedos[i] = vec4(factors.albedo, 0.0);
 }

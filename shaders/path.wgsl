@@ -6,6 +6,9 @@ const ROULETTE_MERCY: f32 = 4.0;
 
 // What the first vertex integrates incident radiance against: transmission into the diffuse layer times cosine, in place of its scattering.
 override IRRADIANCE: bool = false;
+// Whether emitters are sampled at each vertex. If not, paths find light by their own rays alone, draw one set of dimensions a vertex, and
+// end where they meet their last one, whose light is known as far as it ever will be. Twin: render::baseline::lightmap_rt.
+override NEXT_EVENT: bool = true;
 
 struct PathParams {
     max_depth: u32,
@@ -70,19 +73,25 @@ fn integrate(start: Start, params: PathParams, s: ptr<function, Sampler>) -> vec
         let wi = to_local(surface.frame, wo);
         if depth > 0u && surface.emitter != NONE && wi.z > 0.0 {
             let light = emitted(surface);
-            let other = select(pdf_surface(receiver, surface), 0.0, sample.delta);
+            let other = select(pdf_surface(receiver, surface), 0.0, sample.delta || !NEXT_EVENT);
             sum += weight * throughput * light * power_heuristic(sample.pdf, other);
         }
         if depth == params.max_depth {
             break;
         }
-        let l = next_4d(s);
+        var l = vec4(0.0);
+        if NEXT_EVENT {
+            l = next_4d(s);
+        }
         let b = next_4d(s);
         let is_irradiance = IRRADIANCE && depth == 0u;
         var side = select(sign_of(wi.z), 0.0, (materials[surface.material].flags & TRANSMISSIVE) != 0u);
         side = select(side, start.side, is_irradiance);
         receiver = Receiver(surface.p, surface.frame.n * side);
-        let light = light_sample(receiver, l.z, l.xy);
+        var light = NO_LIGHT;
+        if NEXT_EVENT {
+            light = light_sample(receiver, l.z, l.xy);
+        }
         let wl = to_local(surface.frame, light.wi);
         var at: Scattered;
         if is_irradiance {
@@ -114,6 +123,7 @@ fn integrate(start: Start, params: PathParams, s: ptr<function, Sampler>) -> vec
             lives = lives && l.w < survival;
             throughput /= survival;
         }
+        lives = lives && (NEXT_EVENT || depth + 1u < params.max_depth);
         wo = -to_world(surface.frame, sample.wo);
         for (var k = 0u; k < 2u; k++) {
             let is_shadow = k == 0u;
@@ -136,7 +146,7 @@ fn integrate(start: Start, params: PathParams, s: ptr<function, Sampler>) -> vec
         }
         if hit.triangle == NO_TRIANGLE {
             if scene.environments > 0u {
-                let other = select(pdf_environment(-wo), 0.0, sample.delta);
+                let other = select(pdf_environment(-wo), 0.0, sample.delta || !NEXT_EVENT);
                 sum += weight * throughput * environment(-wo) * power_heuristic(sample.pdf, other);
             }
             break;

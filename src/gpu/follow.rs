@@ -1,5 +1,6 @@
 //! Samples of paths that begin at given points: the twin of [`crate::transport::path`]'s entry points.
 
+use super::commands::Commands;
 use super::kernel::{Kernel, shader};
 use super::pace::Pace;
 use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
@@ -40,6 +41,8 @@ pub struct PathStart {
 pub(super) enum Purpose {
     /// A half of the first vertex, or with a scale of 1 and all lobes the whole.
     Scattering(Query),
+    /// The same by rays that follow the lobes alone: no emitter is sampled, and the last vertex sends none.
+    Rays(Query),
     /// Light for a light map. The x of a start's `wo` says on which side of the normal.
     Irradiance,
 }
@@ -116,11 +119,12 @@ impl Follow {
         let source = source();
         let constants = [
             ("IRRADIANCE", f64::from(u8::from(purpose == Purpose::Irradiance))),
+            ("NEXT_EVENT", f64::from(u8::from(!matches!(purpose, Purpose::Rays(_))))),
             ("HAS_LIGHTMAP", f64::from(u8::from(scene.has_lightmap()))),
         ];
         let kernel = Kernel::in_scene(&scene, &source, "follow", [2, 1], &constants)?;
         let query = match purpose {
-            Purpose::Scattering(query) => query,
+            Purpose::Scattering(query) | Purpose::Rays(query) => query,
             Purpose::Irradiance => Query::default(),
         };
         let params = Params {
@@ -146,10 +150,28 @@ impl Follow {
 
     /// Adds the samples of the first `count` of `starts` to `sums`, in one dispatch: of each those from `skipped` on, so many at the most.
     pub fn dispatch(&self, starts: &wgpu::Buffer, sums: &wgpu::Buffer, count: usize, [skipped, samples]: [u32; 2]) -> Result<()> {
-        let gpu = &self.scene.gpu;
+        let params = self.part(count, [skipped, samples])?;
+        self.scene.gpu.dispatch(&self.kernel, &[&params, starts, sums], [count.div_ceil(WORKGROUP) as u32, 1])
+    }
+
+    /// The same among the runs of `commands`, as part of `pass`.
+    pub fn run(
+        &self,
+        (commands, pass): (&mut Commands, &'static str),
+        starts: &wgpu::Buffer,
+        sums: &wgpu::Buffer,
+        count: usize,
+        samples: [u32; 2],
+    ) -> Result<()> {
+        let params = self.part(count, samples)?;
+        commands.run(pass, &self.kernel, &[&params, starts, sums], [count.div_ceil(WORKGROUP) as u32, 1]);
+        Ok(())
+    }
+
+    /// The parameters of a dispatch.
+    fn part(&self, count: usize, [skipped, samples]: [u32; 2]) -> Result<wgpu::Buffer> {
         let params = Params { starts: count as u32, skipped, samples, ..self.params };
-        let params = gpu.upload("parameters of paths", bytemuck::bytes_of(&params))?;
-        gpu.dispatch(&self.kernel, &[&params, starts, sums], [count.div_ceil(WORKGROUP) as u32, 1])
+        self.scene.gpu.upload("parameters of paths", bytemuck::bytes_of(&params))
     }
 
     /// Sums over all samples of every start, in dispatches of a length that `pace` has learnt. `done` hears how many more paths are done.

@@ -60,7 +60,7 @@ fn unchecked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule
     // at which paths start come from hits of the same scene. Pixels, texels and table entries that are computed from coordinates are wrapped
     // or clamped to their image or table, after the coordinates were tested for numbers. The traversal's stack is no deeper than `STACK`,
     // which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the root down or up, or end with a path's depth, which
-    // the roulette bounds. Builds with debug assertions, so all tests, run the same kernels checked.
+    // the roulette bounds or its limit. Builds with debug assertions, so all tests, run the same kernels checked.
     unsafe { gpu.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 

@@ -24,5 +24,5 @@ pub use light::{LightPaths, LightStart};
 pub use path_trace::PathTracer;
 pub use probe::ProbePaths;
 pub use rays::RayTracer;
-pub use render::{Filter, Renderer};
+pub use render::{BaselineFrame, Filter, ImageSpaceGather, LightmapRt, Renderer};
 pub use scene::GpuScene;

@@ -20,7 +20,7 @@ fn apart(a: &[Rgb], b: &[Rgb]) -> f32 {
     a.iter().zip(b).filter(differ).count() as f32 / a.len() as f32
 }
 
-fn lightmap(world: &World, params: &LightParams, gpu: Option<(&GpuScene, &LightPaths)>) -> LightMap {
+pub fn lightmap(world: &World, params: &LightParams, gpu: Option<(&GpuScene, &LightPaths)>) -> LightMap {
     let plan = Plan::new(world, params, 7).unwrap();
     let run = |pass: &reprobe::lightmap::bake::Pass| {
         let store = Memory::default();

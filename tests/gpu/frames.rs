@@ -138,6 +138,21 @@ fn frames_are_the_cpus() {
             assert!((500_000..2_000_000).contains(&bytes), "{bytes} bytes of probes");
         }
     }
+    for (name, options) in [
+        ("rays", "--method lightmap-rt --samples 8 --supersample 2"),
+        ("events", "--method lightmap-rt --max-depth 2 --set next_event=true"),
+        ("mirrors", "--method image-space-gather --supersample 2"),
+    ] {
+        let (frames, timings) = baked.both(name, options);
+        for images in &frames {
+            for layer in ["emission", "diffuse", "glossy", ""] {
+                // A ray that rounding sends another way is another sample.
+                let most = if name == "mirrors" || layer == "emission" || layer == "diffuse" { 1e-3 } else { 5e-3 };
+                assert!(rmse(images, layer) < most, "{name}, {layer}: {}", rmse(images, layer));
+            }
+        }
+        assert!(timings["device"].is_string() && timings["frame_ms"].as_f64().unwrap() > 0.0);
+    }
     for (options, expected) in [
         ("--set filter.method=full", "filter.method"),
         ("--gpu-memory 1M", "--gpu-memory"),

@@ -1,6 +1,7 @@
 //! Kernels against their CPU twins, on whatever adapter there is: a software one will do. Skipped, saying so, where there is none.
 
 mod bakes;
+mod baselines;
 mod filter;
 mod frames;
 mod paths;

@@ -13,7 +13,7 @@ use reprobe::transport::path::PathParams;
 use std::sync::Arc;
 
 /// Share of the pixels that differ by more than rounding, and by how much the means do.
-fn difference(a: &[Rgb], b: &[Rgb]) -> (f32, f32) {
+pub fn difference(a: &[Rgb], b: &[Rgb]) -> (f32, f32) {
     assert_eq!(a.len(), b.len());
     let apart = a.iter().zip(b).filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3 * (1.0 + b.max_element())).count();
     let mean = |side: &[Rgb]| side.iter().map(|c| c.as_dvec3().element_sum()).sum::<f64>();

@@ -7,6 +7,7 @@ use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
 use crate::views::View;
 use anyhow::{Context, bail};
+use reprobe::gpu::{BaselineFrame, ImageSpaceGather, LightmapRt};
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
@@ -36,7 +37,6 @@ struct Setup {
 
 impl Setup {
     fn new(args: &Args, common: &Common, timings: &mut Timings, supersample: u32) -> anyhow::Result<Self> {
-        common.refuse_gpu()?;
         if !(1..=8).contains(&supersample) {
             bail!("--set supersample={supersample}: expected 1 to 8");
         }
@@ -78,7 +78,14 @@ impl Setup {
     }
 }
 
+/// The image of a frame from the GPU.
+fn from_gpu(frame: &BaselineFrame, image: ExrImage, times: &mut FrameTimings) -> ExrImage {
+    times.passes_ms.extend(frame.passes.iter().map(|&(pass, ms)| (pass.into(), ms)));
+    with_layers(image, &frame.layers)
+}
+
 pub fn run_ulr(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
+    common.refuse_gpu()?;
     let params = apply(&UlrParams { supersample: args.supersample, ..UlrParams::default() }, &args.set)?;
     let setup = Setup::new(args, common, &mut timings, params.supersample)?;
     let folder = args.probes.as_ref().context("--method ulr needs --probes DIR, written by bake-probes")?;
@@ -114,9 +121,19 @@ pub fn run_image_space_gather(args: &Args, common: &Common, mut timings: Timings
     let base = apply(&ImageSpaceGatherParams { samples: args.samples.unwrap_or(base.samples), ..base }, &args.set)?;
     let setup = Setup::new(args, common, &mut timings, base.supersample)?;
     let lightmap = setup.lightmap(&timings.method)?;
+    let mut gpu = common.on_gpu(|gpu| ImageSpaceGather::new(gpu, &setup.world, lightmap, base.supersample))?;
+    if let Some(gpu) = &gpu {
+        timings.device = Some(gpu.device().to_owned());
+        timings.clock = if gpu.has_clock() { "gpu" } else { "cpu" }.into();
+    }
     let with = |samples| ImageSpaceGatherParams { samples, ..base };
     let mut render = |view: &View, samples: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {
         let params = with(samples);
+        if let Some(gpu) = &mut gpu {
+            let frame = gpu.frame(&view.camera, &params)?;
+            bar.advance(u64::from(view.camera.size[1]));
+            return Ok(from_gpu(&frame, image, times));
+        }
         let g = setup.gbuffer(view, params.supersample, times);
         let mirror = times.pass("mirror", || mirror_image(&setup.world, lightmap, &g, &params));
         let glossy = times.pass("gather", || gather_image(&setup.world, &g, &mirror, &params));
@@ -139,8 +156,15 @@ pub fn run_lightmap_rt(args: &Args, common: &Common, mut timings: Timings) -> an
     let base = apply(&LightmapRtParams { samples: args.samples.unwrap_or(base.samples), bounces, ..base }, &args.set)?;
     let setup = Setup::new(args, common, &mut timings, base.supersample)?;
     let lightmap = setup.lightmap(&timings.method)?;
+    let mut gpu = common.on_gpu(|gpu| LightmapRt::new(gpu, &setup.world, lightmap, &base))?;
+    timings.device = gpu.as_ref().map(|g| g.device().to_owned());
     let with = |samples| LightmapRtParams { samples, ..base };
     let mut render = |view: &View, samples: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {
+        if let Some(gpu) = &mut gpu {
+            let frame = gpu.frame(&view.camera, samples, common.seed, view.frame)?;
+            bar.advance(u64::from(view.camera.size[1]));
+            return Ok(from_gpu(&frame, image, times));
+        }
         let params = with(samples);
         let g = setup.gbuffer(view, params.supersample, times);
         let glossy = times.pass("rays", || lightmap_rt(&setup.world, lightmap, &g, &params, common.seed, view.frame));

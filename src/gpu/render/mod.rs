@@ -2,16 +2,23 @@
 //!
 //! Probes are gathered from one after the other, so that a frame is right with memory for a single one.
 
+mod baseline;
 mod composite;
 mod coverage;
 mod filter;
 mod footprint;
 mod gather;
 mod gbuffer;
+mod image_space_gather;
+mod lightmap_rt;
+mod mirror;
 mod probes;
 mod view;
 
+pub use baseline::BaselineFrame;
 pub use filter::Filter;
+pub use image_space_gather::ImageSpaceGather;
+pub use lightmap_rt::LightmapRt;
 
 use super::Gpu;
 use super::commands::Commands;
@@ -34,6 +41,7 @@ use footprint::Footprint;
 use gather::{Gather, Sums};
 use gbuffer::GBuffer;
 use glam::{Vec2, Vec4, Vec4Swizzles};
+use mirror::Mirror;
 use probes::{Place, Resident};
 use std::sync::Arc;
 use view::{Guides, View};
@@ -95,6 +103,7 @@ pub struct Renderer<'a> {
     roughness_scale: f32,
     memory: u64,
     gbuffer: GBuffer,
+    mirror: Mirror,
     gather: Gather,
     footprint: Option<Footprint>,
     filter: Filter,
@@ -127,6 +136,7 @@ impl<'a> Renderer<'a> {
             roughness_scale,
             memory,
             gbuffer: GBuffer::new(&scene, world, curvature)?,
+            mirror: Mirror::new(&scene)?,
             coverage: match params.coverage.rays {
                 0 => None,
                 rays => Some(Coverage::new(&scene, rays)?),
@@ -204,6 +214,7 @@ impl<'a> Renderer<'a> {
         let mut commands = Commands::new(gpu);
 
         self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, albedos)?;
+        self.mirror.run(&self.scene, &mut commands, &fine, &t.view)?;
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
         let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos, false);

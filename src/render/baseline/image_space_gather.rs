@@ -31,6 +31,10 @@ const LOBE_SIGMA: f32 = 0.61;
 const REACH: f32 = 2.5;
 /// Longest radius that can be asked for, pixels.
 const MAX_RADIUS: f32 = 4096.0;
+/// Most mirror rays in a row: between mirrors that take nothing they would never end.
+const MOST_RAYS: u32 = 1 << 12;
+/// Most taps.
+const MOST_TAPS: u32 = 1 << 24;
 /// Angle between the directions of successive taps: the golden one.
 const GOLDEN_ANGLE: f32 = 2.399_963_2;
 
@@ -71,6 +75,18 @@ impl Default for ImageSpaceGatherParams {
     }
 }
 
+impl ImageSpaceGatherParams {
+    /// Largest standard deviation of a footprint, pixels.
+    pub(crate) fn max_sigma(&self) -> f32 {
+        self.max_radius.min(MAX_RADIUS) / REACH
+    }
+
+    /// Mirror rays in a row, bounded.
+    pub(crate) fn rays(&self) -> u32 {
+        self.mirror_depth.min(MOST_RAYS)
+    }
+}
+
 /// What a pixel's mirror shows.
 #[derive(Debug, Clone, Copy)]
 pub struct Mirrored {
@@ -99,7 +115,7 @@ pub fn mirror_image(
 fn mirrored(world: &World, lightmap: &LightMap, surface: &Surface, wo: Vec3, params: &ImageSpaceGatherParams) -> (Rgb, f32) {
     let (mut surface, mut wo) = (*surface, wo);
     let (mut sum, mut throughput, mut distance) = (Rgb::ZERO, Rgb::ONE, f32::INFINITY);
-    for bounce in 0..params.mirror_depth {
+    for bounce in 0..params.rays() {
         let ray = surface.spawn(mirror_direction(&surface, wo));
         let Some(hit) = world.intersect(&ray) else {
             return (sum + throughput * world.lights.environment(ray.d), distance);
@@ -124,7 +140,8 @@ fn mirrored(world: &World, lightmap: &LightMap, surface: &Surface, wo: Vec3, par
 
 /// The glossy layer: the mirror picture, gathered over each pixel's footprint, times the reflector's albedo.
 pub fn gather_image(world: &World, view: &GBuffer, mirror: &[Option<Mirrored>], params: &ImageSpaceGatherParams) -> Vec<Rgb> {
-    let image = Image { view, mirror, params, focal: view.camera.focal_px() };
+    let [search, gather] = [params.search_samples, params.samples].map(spiral);
+    let image = Image { view, mirror, params, focal: view.camera.focal_px(), search, gather };
     let pixel = |i: usize| {
         let (Some(p), Some(m)) = (glossy(&view.pixels[i]), &mirror[i]) else { return Rgb::ZERO };
         let light = if p.alpha.unwrap_or(0.0) > 0.0 { image.blurred(i, p, m) } else { m.light };
@@ -133,11 +150,23 @@ pub fn gather_image(world: &World, view: &GBuffer, mirror: &[Option<Mirrored>], 
     (0..mirror.len()).into_par_iter().with_min_len(view.size()[0]).map(pixel).collect()
 }
 
+/// Taps for a standard deviation of 1 on a spiral, as dense as the Gaussian: each counts alike.
+pub(crate) fn spiral(count: u32) -> Vec<Vec2> {
+    let cut = 1.0 - (-0.5 * REACH * REACH).exp();
+    let tap = |k: u32| {
+        let u = (k as f32 + 0.5) / count as f32;
+        Vec2::from_angle(k as f32 * GOLDEN_ANGLE) * (-2.0 * (1.0 - u * cut).ln()).sqrt()
+    };
+    (0..count.min(MOST_TAPS)).map(tap).collect()
+}
+
 struct Image<'a> {
     view: &'a GBuffer,
     mirror: &'a [Option<Mirrored>],
     params: &'a ImageSpaceGatherParams,
     focal: f32,
+    search: Vec<Vec2>,
+    gather: Vec<Vec2>,
 }
 
 impl Image<'_> {
@@ -145,8 +174,7 @@ impl Image<'_> {
     /// the virtual image of the hit lies at d_c + d_r.
     fn sigma(&self, alpha: f32, d_c: f32, d_r: f32) -> f32 {
         let share = if d_r.is_finite() { d_r / (d_c + d_r) } else { 1.0 };
-        let limit = self.params.max_radius.min(MAX_RADIUS) / REACH;
-        (2.0 * LOBE_SIGMA * alpha * share * self.focal).min(limit)
+        (2.0 * LOBE_SIGMA * alpha * share * self.focal).min(self.params.max_sigma())
     }
 
     /// Search and gather.
@@ -155,21 +183,21 @@ impl Image<'_> {
         let own = self.sigma(alpha, p.depth, m.distance);
         let widest = self.sigma(alpha, p.depth, f32::INFINITY);
         let (mut sum, mut total) = (own, 1.0);
-        self.taps(i, p, widest, self.params.search_samples, |weight, tap, there| {
+        self.taps(i, p, widest, &self.search, |weight, tap, there| {
             sum += weight * self.sigma(alpha, tap.depth, there.distance);
             total += weight;
         });
         let sigma = sum / total;
         let (mut light, mut total) = (Rgb::ZERO, 0.0);
-        self.taps(i, p, sigma, self.params.samples, |weight, _, there| {
+        self.taps(i, p, sigma, &self.gather, |weight, _, there| {
             light += there.light * weight;
             total += weight;
         });
         if total > 0.0 { light / total } else { m.light }
     }
 
-    /// Calls `tap` with the bilateral weight of each pixel that the pattern of `count` taps meets within a Gaussian of `sigma`.
-    fn taps(&self, i: usize, p: &Pixel, sigma: f32, count: u32, mut tap: impl FnMut(f32, &Pixel, &Mirrored)) {
+    /// Calls `tap` with the bilateral weight of each pixel that a pattern of taps meets within a Gaussian of `sigma`.
+    fn taps(&self, i: usize, p: &Pixel, sigma: f32, pattern: &[Vec2], mut tap: impl FnMut(f32, &Pixel, &Mirrored)) {
         let [width, height] = self.view.size();
         let (x, y) = ((i % width) as i32, (i / width) as i32);
         let radius = REACH * sigma;
@@ -187,18 +215,15 @@ impl Image<'_> {
             }
         };
         let r = radius as i32;
-        if (2 * r + 1).pow(2) as u32 <= count {
+        if (2 * r + 1).pow(2) as usize <= pattern.len() {
             let q = -0.5 / (sigma * sigma).max(1e-6);
             (-r..=r).for_each(|dy| (-r..=r).for_each(|dx| visit(dx, dy, (q * (dx * dx + dy * dy) as f32).exp())));
             return;
         }
-        // Taps on a spiral, as dense as the Gaussian: each counts alike. Each pixel turns it by an angle of its own.
-        let turn = unit(hash_words(&[i as u32, count])) * TAU;
-        let cut = 1.0 - (-0.5 * REACH * REACH).exp();
-        for k in 0..count {
-            let u = (k as f32 + 0.5) / count as f32;
-            let distance = sigma * (-2.0 * (1.0 - u * cut).ln()).sqrt();
-            let at = Vec2::from_angle(turn + k as f32 * GOLDEN_ANGLE) * distance;
+        // Each pixel turns the spiral by an angle of its own.
+        let turn = Vec2::from_angle(unit(hash_words(&[i as u32, pattern.len() as u32])) * TAU);
+        for &tap in pattern {
+            let at = turn.rotate(tap) * sigma;
             visit(at.x.round() as i32, at.y.round() as i32, 1.0);
         }
     }

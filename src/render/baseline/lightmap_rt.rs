@@ -17,6 +17,9 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+/// Most rays in a row: between mirrors that take nothing they would never end.
+const MOST_BOUNCES: u32 = 1 << 12;
+
 /// Rays of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,6 +38,13 @@ pub struct LightmapRtParams {
 impl Default for LightmapRtParams {
     fn default() -> Self {
         Self { supersample: 1, samples: 4, bounces: 3, next_event: false }
+    }
+}
+
+impl LightmapRtParams {
+    /// The rays as a path: their last hit is a vertex, too.
+    pub(crate) fn path(&self) -> PathParams {
+        PathParams { max_depth: self.bounces.min(MOST_BOUNCES) + 1, rr_depth: u32::MAX }
     }
 }
 
@@ -61,12 +71,11 @@ pub fn lightmap_rt(
 fn light_along(world: &World, lightmap: &LightMap, pixel: &Pixel, params: &LightmapRtParams, sampler: &mut Sampler) -> Rgb {
     let known = |s: &Surface, wo: Vec3| lightmap.diffuse_radiance(&world.scene, s, wo);
     if params.next_event {
-        let path = PathParams { max_depth: params.bounces.saturating_add(1), rr_depth: u32::MAX };
-        return scattered(world, &pixel.surface, pixel.wo, GLOSSY, Some(&known), &path, sampler);
+        return scattered(world, &pixel.surface, pixel.wo, GLOSSY, Some(&known), &params.path(), sampler);
     }
     let (mut surface, mut wo) = (pixel.surface, pixel.wo);
     let (mut sum, mut throughput) = (Rgb::ZERO, Rgb::ONE);
-    for _ in 0..params.bounces {
+    for _ in 1..params.path().max_depth {
         let [x, y, lobe, _] = sampler.next_4d();
         let bsdf = &world.scene.materials[surface.material as usize].bsdf;
         let Some(sample) = bsdf.sample(&surface, surface.frame.to_local(wo), lobe, Vec2::new(x, y), GLOSSY) else { break };

@@ -16,7 +16,7 @@ use crate::transport::bsdf::{Lobes, Query};
 use glam::Vec3;
 
 /// The lobes that make the glossy layer, at the material's own roughness.
-const GLOSSY: Query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: 1.0 };
+pub(crate) const GLOSSY: Query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: 1.0 };
 
 /// Directional albedo of a surface's non-diffuse lobes towards `wo` (unit, world, away from it).
 fn glossy_albedo(scene: &Scene, surface: &Surface, wo: Vec3) -> Rgb {
