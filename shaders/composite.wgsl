@@ -10,6 +10,11 @@ struct Params {
     has_previous: u32,
     // Sub-pixels of a pixel each way.
     supersample: u32,
+    // Whether `glossy` lacks what perfect mirrors show.
+    mirrors: u32,
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
 }
 
 const DEPTH_TOLERANCE: f32 = 0.02;
@@ -34,9 +39,12 @@ const DEPTH_TOLERANCE: f32 = 0.02;
 @group(0) @binding(1) var<storage, read> emission: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> diffuse: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> glossy: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read_write> out_emission: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read_write> out_diffuse: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read_write> out_glossy: array<vec4<f32>>;
+// What perfect mirrors show (mirror_light.wgsl), and the reflectors' albedos.
+@group(0) @binding(4) var<storage, read> mirrored: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read> albedos: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read_write> out_emission: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read_write> out_diffuse: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> out_glossy: array<vec4<f32>>;
 
 // The last frame's glossy colour at p where it saw the same surface; w is 0 where it did not.
 fn lookup_previous(p: vec3<f32>, material: u32) -> vec4<f32> {
@@ -78,7 +86,7 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
     gathered[i] = out;
 }
 
-// Twin: downsample.
+// Twins: mirror_light::add_mirrored and downsample.
 @compute @workgroup_size(16, 4)
 fn layers(@builtin(global_invocation_id) id: vec3<u32>) {
     let n = params.supersample;
@@ -92,7 +100,11 @@ fn layers(@builtin(global_invocation_id) id: vec3<u32>) {
         let i = (id.y * n + k / n) * params.width + id.x * n + k % n;
         sum_emission += emission[i];
         sum_diffuse += diffuse[i];
-        sum_glossy += glossy[i];
+        var shown = glossy[i];
+        if params.mirrors != 0u {
+            shown = max(shown + mirrored[i] * albedos[i], vec4(0.0));
+        }
+        sum_glossy += shown;
     }
     let scale = 1.0 / f32(n * n);
     let out = id.y * (params.width / n) + id.x;

@@ -7,14 +7,18 @@ struct CoverageParams {
     // Sub-pixels of the view along a pixel's side, and rays.
     sub_pixels: u32,
     rays: u32,
-    padding0: u32,
-    padding1: u32,
+    // Whether the colours lack what perfect mirrors show: see mirror_light.wgsl.
+    mirrors: u32,
+    padding: u32,
 }
 
 const MIN_NORMAL_COS: f32 = 0.9;
 const DEPTH_TOLERANCE: f32 = 0.02;
 const SHARP_ALPHA: f32 = 0.05;
 const REFLECTED_TOLERANCE: f32 = 0.05;
+// Twin: render::mirror_light::PERFECT.
+const PERFECT_RAYS: u32 = 4u;
+const GOLDEN_RATIO: f32 = 0.618034;
 
 @group(0) @binding(0) var<storage, read> coverage: CoverageParams;
 // The planes of the view, the filtered colours.
@@ -116,6 +120,11 @@ fn glossy_of(w: vec4<u32>, width: u32, seen: Seen, mirrored: Reflected, at: vec2
     return select(vec3(0.0), best.rgb / best.w, best.w > 0.0);
 }
 
+// Point k of n in the unit square.
+fn lattice_point(k: u32, n: u32) -> vec2<f32> {
+    return vec2((f32(k) + 0.5) / f32(n), fract(f32(k) * GOLDEN_RATIO + 0.5));
+}
+
 @compute @workgroup_size(8, 8)
 fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
     let camera = coverage.camera;
@@ -132,28 +141,60 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
     var glossy = vec3(0.0);
     let rays = coverage.rays;
     for (var k = 0u; k < rays * rays; k++) {
-        let at = vec2<f32>(id.xy) + (vec2(f32(k % rays), f32(k / rays)) + 0.5) / f32(rays);
-        let ray = camera_ray(camera, at, vec2(0.5));
-        let hit = traverse(ray, false);
-        if hit.triangle == NO_TRIANGLE {
-            emission += environment(ray.direction);
-            continue;
-        }
-        let s = surface_at(hit);
-        let wo = -ray.direction;
-        let wi = to_local(s.frame, wo);
-        if s.emitter != NONE && wi.z > 0.0 {
-            emission += emitted(s);
-        }
-        if scene.light_width > 0u {
-            diffuse += bsdf_diffuse_out(s, wi) * lightmap_lookup(s.triangle, s.barycentric, wi.z < 0.0) * FRAC_1_PI;
-        }
-        let seen = Seen(s.p, facing_normal(s, wo), s.t, view_alpha(s, wi.z > 0.0), s.material);
-        if seen.alpha >= 0.0 {
-            var mirrored = Reflected(vec3(0.0), NOTHING);
-            if is_sharp(seen) {
-                mirrored = mirror_hit(s, wo);
+        let at = vec2<f32>(id.xy) + lattice_point(k, rays * rays);
+        var ray = camera_ray(camera, at, vec2(0.5));
+        var seen: Seen;
+        var is_glossy = false;
+        var is_lit_mirror = false;
+        var mirrored = Reflected(vec3(0.0), NOTHING);
+        var throughput = vec3(1.0);
+        // The camera's ray, and what follows from mirror to mirror.
+        for (var bounce = 0u; bounce <= PERFECT_RAYS; bounce++) {
+            let hit = traverse(ray, false);
+            if hit.triangle == NO_TRIANGLE {
+                let light = throughput * environment(ray.direction);
+                emission += select(vec3(0.0), light, bounce == 0u);
+                glossy += select(vec3(0.0), light, bounce > 0u && is_lit_mirror);
+                if bounce == 1u {
+                    mirrored = Reflected(ray.direction, SKY);
+                }
+                break;
             }
+            if bounce == 1u {
+                let f = facet(hit.triangle);
+                let point = f.corners[0] * (1.0 - hit.u - hit.v) + f.corners[1] * hit.u + f.corners[2] * hit.v;
+                mirrored = Reflected(point, f.material);
+            }
+            if bounce > 0u && !is_lit_mirror {
+                break;
+            }
+            let s = surface_at(hit);
+            let wo = -ray.direction;
+            let wi = to_local(s.frame, wo);
+            let alpha = view_alpha(s, wi.z > 0.0);
+            let is_perfect = coverage.mirrors != 0u && alpha == 0.0;
+            let factors = factors_of(s, wi, select(-1.0, 1.0, is_perfect));
+            var light = factors.diffuse;
+            if s.emitter != NONE && wi.z > 0.0 {
+                let own = emitted(s);
+                emission += select(vec3(0.0), own, bounce == 0u);
+                light += select(own, vec3(0.0), bounce == 0u);
+            }
+            if bounce == 0u {
+                diffuse += light;
+                seen = Seen(s.p, facing_normal(s, wo), s.t, alpha, s.material);
+                is_glossy = alpha >= 0.0;
+                is_lit_mirror = is_perfect;
+            } else {
+                glossy += throughput * light;
+            }
+            if !select(is_perfect, is_sharp(seen), bounce == 0u) {
+                break;
+            }
+            throughput *= factors.albedo;
+            ray = spawn(s, mirror_direction(s, wo));
+        }
+        if is_glossy {
             glossy += glossy_of(w, width, seen, mirrored, at * f32(coverage.sub_pixels));
         }
     }
@@ -161,5 +202,5 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
     let out = id.y * camera.width + id.x;
     frame_emission[out] = vec4(emission * scale, 0.0);
     frame_diffuse[out] = vec4(diffuse * scale, 0.0);
-    frame_glossy[out] = vec4(glossy * scale, 0.0);
+    frame_glossy[out] = vec4(max(glossy * scale, vec3(0.0)), 0.0);
 }

@@ -1,13 +1,11 @@
 // A picture of perfect mirror reflections, blurred until it looks glossy (Robison and Shirley 2009). Twin:
-// render::baseline::image_space_gather. Follows mirror.wgsl and gbuffer.wgsl.
+// render::baseline::image_space_gather. The picture is mirror_light.wgsl's. Follows mirror.wgsl and gbuffer.wgsl.
 
 // Struct: gpu::render::image_space_gather::Params.
 struct ImageSpaceGatherParams {
     camera: Camera,
     // Of this dispatch.
     first_row: u32,
-    mirror_depth: u32,
-    max_mirror_alpha: f32,
     // Taps of the search, and of the gather; the former come first in the pattern.
     search_samples: u32,
     samples: u32,
@@ -23,9 +21,6 @@ const REACH: f32 = 2.5;
 
 @group(0) @binding(0) var<storage, read> gathering: ImageSpaceGatherParams;
 
-// What `mirror_image` writes; hits and glossy materials are those of mirror.wgsl.
-@group(0) @binding(3) var<storage, read_write> out_mirrored: array<vec4<f32>>;
-
 // What `gather_image` reads and writes.
 @group(0) @binding(1) var<storage, read> view_positions: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> view_normals: array<vec4<f32>>;
@@ -36,51 +31,6 @@ const REACH: f32 = 2.5;
 // Spirals of taps for a standard deviation of 1.
 @group(0) @binding(6) var<storage, read> pattern: array<vec2<f32>>;
 @group(0) @binding(7) var<storage, read_write> out_glossy: array<vec4<f32>>;
-
-@compute @workgroup_size(8, 8)
-fn mirror_image(@builtin(global_invocation_id) id: vec3<u32>) {
-    let camera = gathering.camera;
-    let y = id.y + gathering.first_row;
-    if id.x >= camera.width || y >= camera.height {
-        return;
-    }
-    let i = y * camera.width + id.x;
-    var light = vec3(0.0);
-    var distance = FAR;
-    if glossy_materials[i] != NOT_GLOSSY {
-        var hit = hits[i];
-        var wo = -camera_ray(camera, vec2(f32(id.x), f32(y)) + 0.5, vec2(0.5)).direction;
-        var throughput = vec3(1.0);
-        for (var bounce = 0u; bounce <= gathering.mirror_depth; bounce++) {
-            let s = surface_at(hit);
-            if bounce > 0u {
-                let wi = to_local(s.frame, wo);
-                if s.emitter != NONE && wi.z > 0.0 {
-                    light += throughput * emitted(s);
-                }
-                let factors = factors_of(s, wi, 1.0);
-                light += throughput * factors.diffuse;
-                let alpha = view_alpha(s, wi.z > 0.0);
-                if !(alpha >= 0.0 && alpha <= gathering.max_mirror_alpha) {
-                    break;
-                }
-                throughput *= factors.albedo;
-            }
-            if bounce == gathering.mirror_depth {
-                break;
-            }
-            let ray = spawn(s, mirror_direction(s, wo));
-            hit = traverse(ray, false);
-            if hit.triangle == NO_TRIANGLE {
-                light += throughput * environment(ray.direction);
-                break;
-            }
-            distance = select(distance, hit.t, bounce == 0u);
-            wo = -ray.direction;
-        }
-    }
-    out_mirrored[i] = vec4(light, distance);
-}
 
 // Standard deviation of a lobe's footprint in the image, pixels.
 fn footprint_sigma(alpha: f32, d_c: f32, d_r: f32) -> f32 {

@@ -133,8 +133,8 @@ pub fn covered_pixels(
 /// Point `k` of `n` in the unit square: a lattice of the golden ratio, whose points lie in as many columns and rows as there are points.
 /// (Along a bar that is nearly upright, a grid of 4 x 4 has but four columns to tell its width by.)
 fn lattice_point(k: u32, n: u32) -> Vec2 {
-    const GOLDEN: f32 = 0.618_034;
-    Vec2::new((k as f32 + 0.5) / n as f32, (k as f32 * GOLDEN + 0.5).fract())
+    const GOLDEN_RATIO: f32 = 0.618_034;
+    Vec2::new((k as f32 + 0.5) / n as f32, (k as f32 * GOLDEN_RATIO + 0.5).fract())
 }
 
 /// A scene and its light.

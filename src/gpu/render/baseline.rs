@@ -73,7 +73,7 @@ impl Baseline {
             let albedos = wants_albedo.then_some(1.0);
             self.gbuffer.run(&scene, &mut commands, &fine, &target.view, albedos)?;
             fill(&mut commands, &fine, &target)?;
-            self.composite.layers(gpu, &mut commands, (&target.view, &fine), &target.glossy, &target.layers)?;
+            self.composite.layers(gpu, &mut commands, (&target.view, &fine), (&target.glossy, None), &target.layers)?;
             let passes = commands.finish()?;
             let mut clock = Clock::start();
             let ([emission, diffuse, glossy], _) = target.layers.read(gpu)?;

@@ -22,6 +22,8 @@ struct Params {
     height: u32,
     has_previous: u32,
     supersample: u32,
+    mirrors: u32,
+    padding: [u32; 3],
 }
 
 /// A frame's layers on the device.
@@ -64,13 +66,21 @@ impl Composite {
         Ok(Self { fill: Kernel::new(gpu, source, "fill")?, layers: Kernel::new(gpu, source, "layers")?, supersample })
     }
 
-    fn params(&self, gpu: &Gpu, size: [u32; 2], camera: &scene::Camera, has_previous: bool) -> Result<wgpu::Buffer> {
+    fn params(
+        &self,
+        gpu: &Gpu,
+        size: [u32; 2],
+        camera: &scene::Camera,
+        [has_previous, mirrors]: [bool; 2],
+    ) -> Result<wgpu::Buffer> {
         let params = Params {
             previous: camera.into(),
             width: size[0],
             height: size[1],
             has_previous: has_previous.into(),
             supersample: self.supersample,
+            mirrors: mirrors.into(),
+            padding: [0; 3],
         };
         gpu.upload("the composite's parameters", bytemuck::bytes_of(&params))
     }
@@ -86,7 +96,7 @@ impl Composite {
         (previous, guides, glossy): (Option<&scene::Camera>, &Guides, &wgpu::Buffer),
         layers: &Layers,
     ) -> Result<()> {
-        let params = self.params(gpu, view.size, previous.unwrap_or(camera), previous.is_some())?;
+        let params = self.params(gpu, view.size, previous.unwrap_or(camera), [previous.is_some(), false])?;
         gpu.clear(&layers.unserved);
         let buffers = [
             &params,
@@ -104,18 +114,20 @@ impl Composite {
         Ok(())
     }
 
-    /// Averages sub-pixels into the frame's layers.
+    /// Averages sub-pixels into the frame's layers. `mirrored` is what perfect mirrors show ([`super::mirror_light`]), where `glossy` lacks
+    /// it.
     pub(super) fn layers(
         &self,
         gpu: &Gpu,
         commands: &mut Commands,
         (view, camera): (&View, &scene::Camera),
-        glossy: &wgpu::Buffer,
+        (glossy, mirrored): (&wgpu::Buffer, Option<&wgpu::Buffer>),
         layers: &Layers,
     ) -> Result<()> {
-        let params = self.params(gpu, view.size, camera, false)?;
+        let params = self.params(gpu, view.size, camera, [false, mirrored.is_some()])?;
         let [emission, diffuse, out] = &layers.planes;
-        let buffers = [&params, &view.emission, &view.diffuse, glossy, emission, diffuse, out];
+        let (mirrored, albedos) = (mirrored.unwrap_or(glossy), &view.albedos);
+        let buffers = [&params, &view.emission, &view.diffuse, glossy, mirrored, albedos, emission, diffuse, out];
         commands.run("composite", &self.layers, &buffers, groups(view.size.map(|n| n / self.supersample), WORKGROUP));
         Ok(())
     }
@@ -129,6 +141,6 @@ mod tests {
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
         let source = shader!("math", "camera", "perturb", "view", "composite");
-        check!(source, Params as "Params" { previous, width, height, has_previous, supersample });
+        check!(source, Params as "Params" { previous, width, height, has_previous, supersample, mirrors });
     }
 }

@@ -21,7 +21,8 @@ struct Params {
     camera: GpuCamera,
     sub_pixels: u32,
     rays: u32,
-    padding: [u32; 2],
+    mirrors: u32,
+    padding: u32,
 }
 
 fn source() -> String {
@@ -40,17 +41,22 @@ impl Coverage {
         Ok(Self { kernel: Kernel::in_scene(scene, &source(), "cover", [6, 3], &[])?, rays })
     }
 
-    /// Renders the pixels along edges anew. `camera` is of the frame's size.
+    /// Renders the pixels along edges anew. `camera` is of the frame's size; `mirrors` says that `glossy` lacks what perfect mirrors show.
     pub(super) fn run(
         &self,
         scene: &GpuScene,
         commands: &mut Commands,
         camera: &Camera,
-        (view, glossy): (&View, &wgpu::Buffer),
+        (view, glossy, mirrors): (&View, &wgpu::Buffer, bool),
         layers: &Layers,
     ) -> Result<()> {
-        let params =
-            Params { camera: camera.into(), sub_pixels: view.size[0] / camera.size[0], rays: self.rays, padding: [0; 2] };
+        let params = Params {
+            camera: camera.into(),
+            sub_pixels: view.size[0] / camera.size[0],
+            rays: self.rays,
+            mirrors: mirrors.into(),
+            padding: 0,
+        };
         let params = scene.gpu.upload("the coverage's parameters", bytemuck::bytes_of(&params))?;
         let [emission, diffuse, out] = &layers.planes;
         let (positions, normals) = (&view.positions, &view.guides.normals);
@@ -67,6 +73,6 @@ mod tests {
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
-        check!(&source(), Params as "CoverageParams" { camera, sub_pixels, rays });
+        check!(&source(), Params as "CoverageParams" { camera, sub_pixels, rays, mirrors });
     }
 }

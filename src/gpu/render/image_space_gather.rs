@@ -6,20 +6,20 @@ use super::super::commands::Commands;
 use super::super::kernel::{Kernel, shader};
 use super::super::scene::{MATERIALS, PATHS, RAYS};
 use super::baseline::{Baseline, BaselineFrame, Target};
-use super::{WORKGROUP, groups};
+use super::mirror_light::MirrorLight;
+use super::{FAR, WORKGROUP, bands, groups};
 use crate::Result;
 use crate::lightmap::LightMap;
 use crate::render::baseline::image_space_gather::{ImageSpaceGatherParams, spiral};
+use crate::render::mirror_light::ChainParams;
 use crate::scene::Camera;
 use crate::transport::World;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 use std::sync::Arc;
 
-/// Edges of a workgroup of the mirror picture, pixels.
-const MIRROR_WORKGROUP: [u32; 2] = [8, 8];
-/// Most taps, and mirror rays, of a dispatch: well below a second on a slow GPU.
-const MOST_WORK: [u64; 2] = [1 << 26, 1 << 22];
+/// Most taps of a dispatch: well below a second on a slow GPU.
+const MOST_TAPS: u64 = 1 << 26;
 
 /// `ImageSpaceGatherParams` of image_space_gather.wgsl.
 #[repr(C)]
@@ -27,8 +27,6 @@ const MOST_WORK: [u64; 2] = [1 << 26, 1 << 22];
 struct Params {
     camera: GpuCamera,
     first_row: u32,
-    mirror_depth: u32,
-    max_mirror_alpha: f32,
     search_samples: u32,
     samples: u32,
     max_sigma: f32,
@@ -43,9 +41,9 @@ fn source() -> String {
 /// Renders frames on a device.
 pub struct ImageSpaceGather {
     baseline: Baseline,
-    mirror_image: Kernel,
+    mirror_light: MirrorLight,
     gather_image: Kernel,
-    /// What `mirror_image` writes.
+    /// What `mirror_light` fills.
     mirrored: Option<wgpu::Buffer>,
 }
 
@@ -54,7 +52,7 @@ impl ImageSpaceGather {
     pub fn new(gpu: Arc<Gpu>, world: &World, lightmap: &LightMap, supersample: u32) -> Result<Self> {
         let baseline = Baseline::new(gpu.clone(), world, lightmap, supersample)?;
         Ok(Self {
-            mirror_image: Kernel::in_scene(&baseline.scene, &source(), "mirror_image", [3, 1], &[])?,
+            mirror_light: MirrorLight::new(&baseline.scene)?,
             gather_image: Kernel::new(&gpu, &source(), "gather_image")?,
             mirrored: None,
             baseline,
@@ -73,7 +71,7 @@ impl ImageSpaceGather {
 
     /// A frame with the glossy layer of [`crate::render::baseline::image_space_gather`]. Of `params` all count but `supersample`.
     pub fn frame(&mut self, camera: &Camera, params: &ImageSpaceGatherParams) -> Result<BaselineFrame> {
-        let Self { baseline, mirror_image, gather_image, mirrored } = self;
+        let Self { baseline, mirror_light, gather_image, mirrored } = self;
         let scene = baseline.scene.clone();
         let gpu = &*scene.gpu;
         let fill = |commands: &mut Commands, camera: &Camera, target: &Target| {
@@ -91,8 +89,6 @@ impl ImageSpaceGather {
                 let params = Params {
                     camera: camera.into(),
                     first_row,
-                    mirror_depth: params.rays(),
-                    max_mirror_alpha: params.max_mirror_alpha,
                     search_samples: search.len() as u32,
                     samples: gather.len() as u32,
                     max_sigma: params.max_sigma(),
@@ -101,12 +97,10 @@ impl ImageSpaceGather {
                 };
                 gpu.upload("the gather's parameters", bytemuck::bytes_of(&params))
             };
-            for (first, rows) in bands(size, MOST_WORK[1], u64::from(params.rays())) {
-                let buffers = [&of_band(first)?, &view.hits, &view.guides.materials, mirrored];
-                commands.run("mirror", mirror_image, &buffers, groups([size[0], rows], MIRROR_WORKGROUP));
-            }
+            let chain = ChainParams { rays: params.rays(), max_alpha: params.max_mirror_alpha };
+            mirror_light.run(&scene, commands, (camera, view), (&chain, FAR), mirrored)?;
             let taps = (search.len() + gather.len()) as u64;
-            for (first, rows) in bands(size, MOST_WORK[0], taps) {
+            for (first, rows) in bands(size, MOST_TAPS, taps) {
                 let params = &of_band(first)?;
                 let (positions, normals, materials) = (&view.positions, &view.guides.normals, &view.guides.materials);
                 let buffers = [params, positions, normals, materials, &view.albedos, mirrored, &pattern, &target.glossy];
@@ -118,14 +112,6 @@ impl ImageSpaceGather {
     }
 }
 
-/// First row and number of rows of parts of a picture that come to `most` steps, if each of its pixels takes `steps`; whole workgroups.
-fn bands([width, height]: [u32; 2], most: u64, steps: u64) -> impl Iterator<Item = (u32, u32)> {
-    const EDGE: u64 = 8;
-    let rows = most / (u64::from(width) * steps.max(1)).max(1) / EDGE * EDGE;
-    let rows = rows.clamp(EDGE, u64::from(height).max(EDGE)) as u32;
-    (0..height).step_by(rows as usize).map(move |first| (first, rows))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::super::layout::check;
@@ -134,14 +120,7 @@ mod tests {
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
         check!(&source(), Params as "ImageSpaceGatherParams" {
-            camera, first_row, mirror_depth, max_mirror_alpha, search_samples, samples, max_sigma, min_normal_cos, plane_sigma
+            camera, first_row, search_samples, samples, max_sigma, min_normal_cos, plane_sigma
         });
-    }
-
-    #[test]
-    fn bands_cover_a_picture_once() {
-        assert_eq!(bands([960, 540], 1 << 26, 80).collect::<Vec<_>>(), [(0, 540)]);
-        let parts: Vec<_> = bands([100, 37], 1 << 10, 1).collect();
-        assert_eq!(parts.iter().map(|p| p.0).collect::<Vec<_>>(), [0, 8, 16, 24, 32]);
     }
 }

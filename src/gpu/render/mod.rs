@@ -12,6 +12,7 @@ mod gbuffer;
 mod image_space_gather;
 mod lightmap_rt;
 mod mirror;
+mod mirror_light;
 mod probes;
 mod view;
 
@@ -30,6 +31,7 @@ use crate::render::candidates::Candidates;
 use crate::render::footprint::FootprintParams;
 use crate::render::gather::Gathered;
 use crate::render::glossy_probes::{Buffers, Clock, Frame, GlossyProbeParams, nearest_probes};
+use crate::render::mirror_light::PERFECT;
 use crate::scene::Camera;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
@@ -42,6 +44,7 @@ use gather::{Gather, Sums};
 use gbuffer::GBuffer;
 use glam::{Vec2, Vec4, Vec4Swizzles};
 use mirror::Mirror;
+use mirror_light::MirrorLight;
 use probes::{Place, Resident};
 use std::sync::Arc;
 use view::{Guides, View};
@@ -56,6 +59,14 @@ fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(workgroup[0]), size[1].div_ceil(workgroup[1])]
 }
 
+/// First row and number of rows of parts of a picture that come to `most` steps, if each of its pixels takes `steps`; whole workgroups.
+fn bands([width, height]: [u32; 2], most: u64, steps: u64) -> impl Iterator<Item = (u32, u32)> {
+    const EDGE: u64 = 8;
+    let rows = most / (u64::from(width) * steps.max(1)).max(1) / EDGE * EDGE;
+    let rows = rows.clamp(EDGE, u64::from(height).max(EDGE)) as u32;
+    (0..height).step_by(rows as usize).map(move |first| (first, rows))
+}
+
 /// The buffers of frames of one size.
 struct Target {
     view: View,
@@ -67,6 +78,8 @@ struct Target {
     gathered: wgpu::Buffer,
     covariances: wgpu::Buffer,
     scratch: Scratch,
+    /// What perfect mirrors show.
+    mirrored: wgpu::Buffer,
     /// Filtered; as long as nothing has been filtered, the frame's before.
     glossy: wgpu::Buffer,
     layers: Layers,
@@ -74,7 +87,7 @@ struct Target {
 
 impl Target {
     /// Bytes a sub-pixel, but for the layers and the anchors.
-    const BYTES: u64 = View::BYTES + 20 + 8 * 16;
+    const BYTES: u64 = View::BYTES + 20 + 9 * 16;
 
     fn new(gpu: &Gpu, size: [u32; 2], params: &GlossyProbeParams) -> Result<Self> {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
@@ -86,6 +99,7 @@ impl Target {
             gathered: gpu.output("gathered colours", 16 * pixels)?,
             covariances: gpu.output("covariances", 16 * pixels)?,
             scratch: Scratch::new(gpu, pixels)?,
+            mirrored: gpu.output("what mirrors show", 16 * pixels)?,
             glossy: gpu.output("filtered colours", 16 * pixels)?,
             layers: Layers::new(gpu, pixels / u64::from(params.supersample * params.supersample))?,
         })
@@ -104,6 +118,8 @@ pub struct Renderer<'a> {
     memory: u64,
     gbuffer: GBuffer,
     mirror: Mirror,
+    /// Where there is a light map to light mirrors by.
+    mirror_light: Option<MirrorLight>,
     gather: Gather,
     footprint: Option<Footprint>,
     filter: Filter,
@@ -137,6 +153,7 @@ impl<'a> Renderer<'a> {
             memory,
             gbuffer: GBuffer::new(&scene, world, curvature)?,
             mirror: Mirror::new(&scene)?,
+            mirror_light: (lightmap.is_some() && params.mirror_light).then(|| MirrorLight::new(&scene)).transpose()?,
             coverage: match params.coverage.rays {
                 0 => None,
                 rays => Some(Coverage::new(&scene, rays)?),
@@ -213,11 +230,17 @@ impl<'a> Renderer<'a> {
         let mut clock = Clock::start();
         let mut commands = Commands::new(gpu);
 
-        self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, albedos)?;
+        let mirror_light = self.mirror_light.as_ref().filter(|_| probes.set.mirrored);
+        let mirrors = mirror_light.is_some();
+        let wanted = albedos.or(mirrors.then_some(self.roughness_scale));
+        self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, wanted)?;
         self.mirror.run(&self.scene, &mut commands, &fine, &t.view)?;
+        if let Some(mirror_light) = mirror_light {
+            mirror_light.run(&self.scene, &mut commands, (&fine, &t.view), (&PERFECT, PERFECT.max_alpha), &t.mirrored)?;
+        }
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
-        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos, false);
+        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos, mirrors);
         for (index, weight) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
             clock.restart();
             let probe = probes.probe(index)?;
@@ -241,9 +264,9 @@ impl<'a> Renderer<'a> {
             glossy: &t.glossy,
         };
         self.filter.run(&mut commands, &planes)?;
-        self.composite.layers(gpu, &mut commands, (view, &fine), &t.glossy, &t.layers)?;
+        self.composite.layers(gpu, &mut commands, (view, &fine), (&t.glossy, mirrors.then_some(&t.mirrored)), &t.layers)?;
         if let Some(coverage) = &self.coverage {
-            coverage.run(&self.scene, &mut commands, camera, (view, &t.glossy), &t.layers)?;
+            coverage.run(&self.scene, &mut commands, camera, (view, &t.glossy, mirrors), &t.layers)?;
         }
         clock.restart();
         for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
@@ -282,5 +305,17 @@ impl Target {
             gathered: colors.iter().zip(&sums).zip(&best).map(gathered).collect(),
             covariance: gpu.read::<Vec4>(&self.covariances)?.iter().map(|c| c.xyz().to_array()).collect(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_a_picture_once() {
+        assert_eq!(bands([960, 540], 1 << 26, 80).collect::<Vec<_>>(), [(0, 540)]);
+        let parts: Vec<_> = bands([100, 37], 1 << 10, 1).collect();
+        assert_eq!(parts.iter().map(|p| p.0).collect::<Vec<_>>(), [0, 8, 16, 24, 32]);
     }
 }

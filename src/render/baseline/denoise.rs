@@ -9,9 +9,10 @@
 //!
 //! In: layers and their guides, linear. Out: layers.
 
-use super::{GLOSSY, glossy_albedo};
+use super::GLOSSY;
 use crate::math::{Rgb, hash_words, luminance};
 use crate::render::mirror::{facing_normal, mirror_direction};
+use crate::render::mirror_light::glossy_albedo;
 use crate::render::path_trace::LayerImages;
 use crate::scene::Camera;
 use crate::transport::bsdf::Lobes;
@@ -129,7 +130,7 @@ fn surface_guides(world: &World, s: &Surface, wo: Vec3, params: &DenoiseParams) 
     let through = match world.intersect(&ray) {
         Some(hit) => {
             let there = world.scene.materials[hit.material as usize].bsdf.diffuse_albedo(&hit, hit.frame.to_local(-ray.d));
-            let all = there + glossy_albedo(&world.scene, &hit, -ray.d);
+            let all = there + glossy_albedo(world, &hit, -ray.d);
             Guide { normal: facing_normal(&hit, -ray.d), depth: depth + hit.t, albedo: all * lobe, factor: lobe * all }
         }
         None => Guide { normal: Vec3::ZERO, depth: FAR, albedo: lobe, factor: lobe },

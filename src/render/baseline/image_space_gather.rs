@@ -13,14 +13,13 @@
 //!
 //! In: a view's G-buffer. Out: its glossy layer, linear radiance.
 
-use super::{glossy, glossy_albedo};
+use super::glossy;
 use crate::lightmap::LightMap;
 use crate::math::{Rgb, hash_words, unit};
 use crate::render::gbuffer::{GBuffer, Pixel};
-use crate::render::mirror::mirror_direction;
-use crate::transport::bsdf::Lobes;
-use crate::transport::{Surface, World};
-use glam::{Vec2, Vec3};
+use crate::render::mirror_light::{ChainParams, glossy_albedo, mirror_chain};
+use crate::transport::World;
+use glam::Vec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
@@ -105,37 +104,11 @@ pub fn mirror_image(
 ) -> Vec<Option<Mirrored>> {
     let pixel = |pixel: &Option<Pixel>| {
         let p = glossy(pixel)?;
-        let (light, distance) = mirrored(world, lightmap, &p.surface, p.wo, params);
-        Some(Mirrored { light, distance })
+        let chain = ChainParams { rays: params.rays(), max_alpha: params.max_mirror_alpha };
+        let shown = mirror_chain(world, lightmap, &p.surface, p.wo, &chain);
+        Some(Mirrored { light: shown.light, distance: shown.first.map_or(f32::INFINITY, |hit| hit.t) })
     };
     view.pixels.par_iter().with_min_len(view.size()[0]).map(pixel).collect()
-}
-
-/// Radiance along the mirror direction of `surface`, and the first hit's distance.
-fn mirrored(world: &World, lightmap: &LightMap, surface: &Surface, wo: Vec3, params: &ImageSpaceGatherParams) -> (Rgb, f32) {
-    let (mut surface, mut wo) = (*surface, wo);
-    let (mut sum, mut throughput, mut distance) = (Rgb::ZERO, Rgb::ONE, f32::INFINITY);
-    for bounce in 0..params.rays() {
-        let ray = surface.spawn(mirror_direction(&surface, wo));
-        let Some(hit) = world.intersect(&ray) else {
-            return (sum + throughput * world.lights.environment(ray.d), distance);
-        };
-        if bounce == 0 {
-            distance = hit.t;
-        }
-        wo = -ray.d;
-        sum += throughput * (world.lights.emitted(&world.scene, &hit, wo) + lightmap.diffuse_radiance(&world.scene, &hit, wo));
-        let bsdf = &world.scene.materials[hit.material as usize].bsdf;
-        let is_mirror = bsdf.lobes().contains(Lobes::NON_DIFFUSE)
-            && (bsdf.is_two_sided() || hit.frame.n.dot(wo) > 0.0)
-            && bsdf.alpha(&hit).is_some_and(|alpha| alpha <= params.max_mirror_alpha);
-        if !is_mirror {
-            break;
-        }
-        throughput *= glossy_albedo(&world.scene, &hit, wo);
-        surface = hit;
-    }
-    (sum, distance)
 }
 
 /// The glossy layer: the mirror picture, gathered over each pixel's footprint, times the reflector's albedo.
@@ -145,7 +118,7 @@ pub fn gather_image(world: &World, view: &GBuffer, mirror: &[Option<Mirrored>], 
     let pixel = |i: usize| {
         let (Some(p), Some(m)) = (glossy(&view.pixels[i]), &mirror[i]) else { return Rgb::ZERO };
         let light = if p.alpha.unwrap_or(0.0) > 0.0 { image.blurred(i, p, m) } else { m.light };
-        light * glossy_albedo(&world.scene, &p.surface, p.wo)
+        light * glossy_albedo(world, &p.surface, p.wo)
     };
     (0..mirror.len()).into_par_iter().with_min_len(view.size()[0]).map(pixel).collect()
 }

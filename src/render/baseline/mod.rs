@@ -9,19 +9,10 @@ pub mod lightmap_rt;
 pub mod ulr;
 
 use super::gbuffer::Pixel;
-use crate::math::Rgb;
-use crate::scene::Scene;
-use crate::transport::Surface;
 use crate::transport::bsdf::{Lobes, Query};
-use glam::Vec3;
 
 /// The lobes that make the glossy layer, at the material's own roughness.
 pub(crate) const GLOSSY: Query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: 1.0 };
-
-/// Directional albedo of a surface's non-diffuse lobes towards `wo` (unit, world, away from it).
-fn glossy_albedo(scene: &Scene, surface: &Surface, wo: Vec3) -> Rgb {
-    scene.materials[surface.material as usize].bsdf.glossy_albedo(surface, surface.frame.to_local(wo), GLOSSY)
-}
 
 /// Pixels that have a glossy layer at all.
 fn glossy(pixel: &Option<Pixel>) -> Option<&Pixel> {
