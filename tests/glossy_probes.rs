@@ -2,8 +2,11 @@
 
 use glam::{Vec2, Vec3};
 use reprobe::io::Provenance;
+use reprobe::lightmap::lookup::sides;
+use reprobe::lightmap::{Atlas, AtlasParams};
+use reprobe::math::reflect;
 use reprobe::probe::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
-use reprobe::probe::file::Probe;
+use reprobe::probe::file::{Probe, Texel};
 use reprobe::probe::qhmap::ParameterMap;
 use reprobe::progress::Silent;
 use reprobe::render::candidates::Candidates;
@@ -12,6 +15,7 @@ use reprobe::render::coverage::{CoverageParams, SubPixels, covered_pixels};
 use reprobe::render::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
 use reprobe::render::gbuffer::{GBuffer, gbuffer};
 use reprobe::render::mirror::{Reflected, mirror_hit, mirror_pass};
+use reprobe::render::mirror_light::{add_mirrored, mirror_light_pass};
 use reprobe::render::perturb::Order;
 use reprobe::scene::load::{LoadOptions, load};
 use reprobe::scene::{Camera, Scene};
@@ -19,24 +23,29 @@ use reprobe::surface::{CurvatureMap, CurvatureParams, curvature};
 use reprobe::transport::World;
 
 /// A wall of a room from -2 to 2 in x and y and 0 to 4 in z, as Mitsuba's rectangle turned and moved, glowing in its own colour.
-fn wall(rotate: &str, translate: &str, radiance: &str) -> String {
+fn wall(reflectance: &str, rotate: &str, translate: &str, radiance: &str) -> String {
     format!(
         r#"<shape type="rectangle"><transform name="to_world"><scale value="2"/>{rotate}<translate value="{translate}"/></transform>
-        <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
+        <bsdf type="diffuse"><rgb name="reflectance" value="{reflectance}"/></bsdf>
         <emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter></shape>"#
     )
 }
 
 /// The room with `reflector` in it; its walls' radiances differ, so that each pixel of a mirror tells which wall it shows.
 fn room(reflector: &str) -> Scene {
+    room_of("0", reflector)
+}
+
+/// The same, of walls that reflect as well.
+fn room_of(reflectance: &str, reflector: &str) -> Scene {
     let turn = |x: i32, y: i32, angle: i32| format!(r#"<rotate x="{x}" y="{y}" z="0" angle="{angle}"/>"#);
     let walls = [
-        wall("", "0,0,0", "1,0,0"),
-        wall(&turn(0, 1, 180), "0,0,4", "0,2,0"),
-        wall(&turn(0, 1, 90), "-2,0,2", "0,0,3"),
-        wall(&turn(0, 1, -90), "2,0,2", "4,4,0"),
-        wall(&turn(1, 0, -90), "0,-2,2", "0,5,5"),
-        wall(&turn(1, 0, 90), "0,2,2", "6,0,6"),
+        wall(reflectance, "", "0,0,0", "1,0,0"),
+        wall(reflectance, &turn(0, 1, 180), "0,0,4", "0,2,0"),
+        wall(reflectance, &turn(0, 1, 90), "-2,0,2", "0,0,3"),
+        wall(reflectance, &turn(0, 1, -90), "2,0,2", "4,4,0"),
+        wall(reflectance, &turn(1, 0, -90), "0,-2,2", "0,5,5"),
+        wall(reflectance, &turn(1, 0, 90), "0,2,2", "6,0,6"),
     ];
     let xml = format!(r#"<scene version="3.0.0">{}{reflector}</scene>"#, walls.concat());
     let dir = tempfile::tempdir().unwrap();
@@ -82,7 +91,11 @@ impl Setup {
     }
 
     fn gather(&self, view: &GBuffer, reflected: &[Reflected], params: &GatherParams) -> Vec<Gathered> {
-        let candidates: Vec<_> = self.probes.iter().map(|p| Candidates::new(&self.world, p, Some(0.5), false)).collect();
+        self.gather_with(view, reflected, params, false)
+    }
+
+    fn gather_with(&self, view: &GBuffer, reflected: &[Reflected], params: &GatherParams, mirror_light: bool) -> Vec<Gathered> {
+        let candidates: Vec<_> = self.probes.iter().map(|p| Candidates::new(&self.world, p, Some(0.5), mirror_light)).collect();
         let probes = self.probes.iter().zip(&candidates).enumerate();
         let weighted: Vec<_> =
             probes.map(|(index, (probe, candidates))| WeightedProbe { index, probe, candidates, weight: 0.125 }).collect();
@@ -211,6 +224,55 @@ fn coverage_antialiases_edges_and_what_mirrors_show_of_them() {
         }
         assert!(covered_pixels(&setup.world, None, false, &camera, &sub, &CoverageParams { rays: 0 }).is_empty());
     }
+}
+
+#[test]
+fn what_perfect_mirrors_show_of_lamps_needs_no_texels() {
+    let plate = r#"<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate y="1" angle="180"/><translate value="0.9,0.4,3.2"/></transform>
+        <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.2"/></bsdf></shape>"#;
+    let mirror = format!(
+        r#"<shape type="rectangle"><transform name="to_world"><scale value="1.5"/><translate value="0,0,0.1"/></transform>{MIRROR}</shape>"#
+    );
+    let scene = room_of("0.5", &(mirror + plate));
+    let mut setup = Setup::new(scene, Vec3::new(0.2, 0.1, 2.0), 0.6, 64);
+    // A light map of many colours, finer than the probes.
+    let atlas = AtlasParams { texel: Some(0.1), ..Default::default() };
+    let atlas = Atlas::build(&setup.world.scene.geometry, &|_| true, &atlas).unwrap();
+    let texels = atlas.size[0] * atlas.size[1];
+    let colours = (0..texels).map(|i| Vec3::new((i % 7) as f32, (i % 5) as f32, (i % 3) as f32)).collect();
+    let map = sides(&setup.world.scene.geometry, &atlas, colours, None);
+    let params = BakeParams { spp: 4, ..BakeParams::default() };
+    let bake = Bake { world: &setup.world, params: &params, seed: 0, lightmap: Some(&map), gpu: None };
+    assert!(bake.tells_mirrored());
+    for (i, probe) in setup.probes.iter_mut().enumerate() {
+        bake_glossy(&bake, probe, i as u32, &|_| true, &Silent).unwrap();
+    }
+    let is_wall = |m: u16| setup.world.scene.geometry.objects.iter().any(|o| o.material == u32::from(m) && o.emitter.is_some());
+    let told: Vec<&Texel> = setup.probes.iter().flat_map(|p| &p.texels).filter(|t| t.mirrored() != Vec3::ZERO).collect();
+    assert!(told.len() > 1000 && told.iter().all(|t| is_wall(t.reflected_material)), "{}: the plate does not glow", told.len());
+    assert!(told.iter().all(|t| (t.glossy() - t.mirrored()).length() < 1e-2));
+
+    let (view, reflected) = setup.view(Vec3::new(0.3, 0.05, 2.1), Vec3::ZERO);
+    let shown = mirror_light_pass(&setup.world, &map, &view);
+    let wrong = |glossy: &[Vec3]| {
+        let wall = |i: &usize| view.pixels[*i].as_ref().is_some_and(|p| p.alpha == Some(0.0)) && is_wall(reflected[*i].material);
+        let pixels: Vec<usize> = (0..glossy.len()).filter(wall).collect();
+        let differs = |i: &&usize| {
+            let p = view.pixels[**i].as_ref().unwrap();
+            let ray = p.surface.spawn(reflect(p.wo, p.normal));
+            let hit = setup.world.intersect(&ray).unwrap();
+            let light = setup.emission(reflected[**i].material) + map.diffuse_radiance(&setup.world.scene, &hit, -ray.d);
+            (glossy[**i] - light).length() > 0.01
+        };
+        (pixels.iter().filter(differs).count(), pixels.len())
+    };
+    let gathered = |mirror_light: bool| -> Vec<Vec3> {
+        let all = setup.gather_with(&view, &reflected, &GatherParams::default(), mirror_light);
+        all.iter().map(|g| g.color).collect()
+    };
+    let (plain, lit) = (wrong(&gathered(false)), wrong(&add_mirrored(&gathered(true), &shown)));
+    assert!(plain.1 > 500 && plain.0 > 500, "{plain:?}: nothing to be cured");
+    assert_eq!(lit.0, 0, "of {}", lit.1);
 }
 
 #[test]
