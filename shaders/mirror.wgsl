@@ -13,15 +13,20 @@ fn facing_normal(s: Surface, wo: vec3<f32>) -> vec3<f32> {
     return select(ng, n, dot(n, wo) > 0.0);
 }
 
-// Traces the mirror ray of a surface for a viewer at direction `wo`.
-fn mirror_hit(s: Surface, wo: vec3<f32>) -> Reflected {
+// Unit direction in which a surface, as a mirror, sends the view from direction `wo` on. Twin: render::mirror::mirror_direction.
+fn mirror_direction(s: Surface, wo: vec3<f32>) -> vec3<f32> {
     let ng = select(s.ng, -s.ng, dot(s.ng, wo) < 0.0);
     var d = mirror(wo, facing_normal(s, wo));
     if dot(d, ng) <= 0.0 {
         // The interpolated normal bends the ray into the surface.
         d = mirror(wo, ng);
     }
-    d = normalize_or(d, ng);
+    return normalize_or(d, ng);
+}
+
+// Traces the mirror ray of a surface for a viewer at direction `wo`.
+fn mirror_hit(s: Surface, wo: vec3<f32>) -> Reflected {
+    let d = mirror_direction(s, wo);
     let hit = traverse(spawn(s, d), false);
     if hit.triangle == NO_TRIANGLE {
         return Reflected(d, SKY);

@@ -1,10 +1,12 @@
 //! Kernels against their CPU twins, on whatever adapter there is: a software one will do. Skipped, saying so, where there is none.
 
 mod bakes;
+mod denoise;
 mod filter;
 mod frames;
 mod paths;
 mod rays;
+mod ulr;
 
 use reprobe::gpu::{Choice, Gpu, adapters};
 use reprobe::transport::World;

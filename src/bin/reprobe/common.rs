@@ -97,7 +97,7 @@ impl Common {
             Choice::Auto | Choice::Cpu => Ok(()),
             Choice::Gpu | Choice::Named(_) => {
                 bail!(
-                    "--device: resmap, bake-probes, bake-lightmap, run, evaluate and render-path's glossy-probes and path-trace use a GPU; use --device cpu here"
+                    "--device: resmap, bake-probes, bake-lightmap, run, evaluate and render-path's glossy-probes, ulr and path-trace use a GPU; use --device cpu here"
                 )
             }
         }

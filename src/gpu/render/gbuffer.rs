@@ -1,4 +1,4 @@
-//! The G-buffer and its mirror rays: the twin of [`crate::render::gbuffer`] and [`crate::render::mirror`].
+//! The G-buffer: the twin of [`crate::render::gbuffer`].
 
 use super::super::camera::GpuCamera;
 use super::super::commands::Commands;
@@ -44,7 +44,6 @@ fn source() -> String {
 pub(super) struct GBuffer {
     gbuffer: Kernel,
     view_factors: Kernel,
-    mirror: Kernel,
     curved_vertices: wgpu::Buffer,
     curvatures: wgpu::Buffer,
 }
@@ -65,7 +64,6 @@ impl GBuffer {
         Ok(Self {
             gbuffer: Kernel::in_scene(scene, &source, "gbuffer", [3, 6], &[])?,
             view_factors: Kernel::in_scene(scene, &source, "view_factors", [3, 2], &[])?,
-            mirror: Kernel::in_scene(scene, &source, "mirror_pass", [3, 1], &[])?,
             curved_vertices: gpu.upload("the curved triangles", bytemuck::cast_slice(&vertices))?,
             curvatures: gpu.upload("the scene's curvatures", bytemuck::cast_slice(&curvatures))?,
         })
@@ -88,7 +86,6 @@ impl GBuffer {
         let gpu = &scene.gpu;
         let params = Params { camera: camera.into(), roughness_scale: roughness_scale.unwrap_or(-1.0), padding: [0; 3] };
         let params = gpu.upload("the G-buffer's parameters", bytemuck::bytes_of(&params))?;
-        let camera = gpu.upload("the camera", bytemuck::bytes_of(&GpuCamera::from(camera)))?;
         let groups = groups(view.size, WORKGROUP);
         let (hits, materials) = (&view.hits, &view.guides.materials);
         let buffers = [
@@ -104,7 +101,6 @@ impl GBuffer {
         ];
         commands.run("gbuffer", &self.gbuffer, &buffers, groups);
         commands.run("gbuffer", &self.view_factors, &[&params, hits, materials, &view.diffuse, &view.albedos], groups);
-        commands.run("mirror", &self.mirror, &[&camera, hits, materials, &view.reflected], groups);
         Ok(())
     }
 }

@@ -8,10 +8,13 @@ mod filter;
 mod footprint;
 mod gather;
 mod gbuffer;
+mod mirror;
 mod probes;
+mod ulr;
 mod view;
 
 pub use filter::Filter;
+pub use ulr::Ulr;
 
 use super::Gpu;
 use super::commands::Commands;
@@ -34,7 +37,8 @@ use footprint::Footprint;
 use gather::{Gather, Sums};
 use gbuffer::GBuffer;
 use glam::{Vec2, Vec4, Vec4Swizzles};
-use probes::{Place, Resident};
+use mirror::Mirror;
+use probes::{GpuProbe, Place, Resident};
 use std::sync::Arc;
 use view::{Guides, View};
 
@@ -46,6 +50,26 @@ const WORKGROUP: [u32; 2] = [16, 4];
 /// Workgroups that cover a picture.
 fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(workgroup[0]), size[1].div_ceil(workgroup[1])]
+}
+
+fn area([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// What `frame` bytes for frames of `size` leave of the memory. An error where that is less than a probe's bytes.
+fn room_for_probes(memory: u64, size: [u32; 2], frame: u64, probe: u64) -> Result<u64> {
+    if frame + probe > memory {
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        return Err(Error::Request(format!(
+            "--gpu-memory: frames of {}x{} take {} MiB and a probe {} MiB, but {} MiB are allowed; give more, or use --device cpu",
+            size[0],
+            size[1],
+            mib(frame),
+            mib(probe),
+            mib(memory)
+        )));
+    }
+    Ok(memory - frame)
 }
 
 /// The buffers of frames of one size.
@@ -95,12 +119,13 @@ pub struct Renderer<'a> {
     roughness_scale: f32,
     memory: u64,
     gbuffer: GBuffer,
+    mirror: Mirror,
     gather: Gather,
     footprint: Option<Footprint>,
     filter: Filter,
     composite: Composite,
     coverage: Option<Coverage>,
-    resident: Resident,
+    resident: Resident<GpuProbe>,
     target: Option<Target>,
 }
 
@@ -127,6 +152,7 @@ impl<'a> Renderer<'a> {
             roughness_scale,
             memory,
             gbuffer: GBuffer::new(&scene, world, curvature)?,
+            mirror: Mirror::new(&scene)?,
             coverage: match params.coverage.rays {
                 0 => None,
                 rays => Some(Coverage::new(&scene, rays)?),
@@ -170,21 +196,8 @@ impl<'a> Renderer<'a> {
         if let Some(target) = self.target.take().filter(|t| t.view.size == fine) {
             return Ok(target);
         }
-        let area = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
         let frame = area(fine) * Target::BYTES + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
-        let probe = area(probe) * probes::TEXEL;
-        if frame + probe > self.memory {
-            let mib = |bytes: u64| bytes.div_ceil(1 << 20);
-            return Err(Error::Request(format!(
-                "--gpu-memory: frames of {}x{} take {} MiB and a probe {} MiB, but {} MiB are allowed; give more, or use --device cpu",
-                size[0],
-                size[1],
-                mib(frame),
-                mib(probe),
-                mib(self.memory)
-            )));
-        }
-        self.resident.set_budget(self.memory - frame);
+        self.resident.set_budget(room_for_probes(self.memory, size, frame, area(probe) * probes::TEXEL)?);
         Target::new(&self.gpu, fine, &self.params)
     }
 
@@ -204,13 +217,14 @@ impl<'a> Renderer<'a> {
         let mut commands = Commands::new(gpu);
 
         self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, albedos)?;
+        self.mirror.run(&self.scene, &mut commands, &fine, &t.view)?;
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
-        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos);
+        let upload = |probe: &Probe| GpuProbe::upload(gpu, probe, &Candidates::new(self.world, probe, albedos));
         for (index, weight) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
             clock.restart();
             let probe = probes.probe(index)?;
-            let there = self.resident.get(gpu, index, &probe, || candidates(&probe))?;
+            let there = self.resident.get(gpu, index, probes::bytes(&probe), || upload(&probe))?;
             clock.lap("load");
             self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &Place::new(index, &probe, weight)), &t.sums)?;
         }
@@ -238,7 +252,7 @@ impl<'a> Renderer<'a> {
         for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
             // What fails here fails again when that frame is rendered.
             if let Ok(probe) = probes.probe(index) {
-                self.resident.upload_ahead(gpu, index, &probe, || candidates(&probe))?;
+                self.resident.upload_ahead(gpu, index, probes::bytes(&probe), || upload(&probe))?;
             }
         }
         clock.lap("load");
