@@ -1,5 +1,5 @@
 // View-dependent colour from one probe (§5.2), added to what other probes gave. Twin: render::gather.
-// Follows math.wgsl, perturb.wgsl and view.wgsl.
+// Follows math.wgsl, perturb.wgsl, view.wgsl and probe.wgsl.
 //
 // `find_anchors` searches for one pixel in so many in full, `gather` for those between, from where these ended.
 
@@ -19,19 +19,6 @@ struct Params {
     padding: u32,
     // Radius and step of each level.
     search: array<vec2<f32>, 8>,
-}
-
-// Struct: gpu::render::probes::Place.
-struct Probe {
-    position: vec3<f32>,
-    // t_i.
-    weight: f32,
-    size: vec2<i32>,
-    mesh: vec2<i32>,
-    index: u32,
-    padding0: u32,
-    padding1: u32,
-    padding2: u32,
 }
 
 // Struct: render::candidates::Seen.
@@ -89,14 +76,12 @@ const ANCHOR_TOLERANCE: vec2<f32> = vec2(3.0, 0.1);
 const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
 
 @group(0) @binding(0) var<storage, read> params: Params;
-@group(0) @binding(1) var<storage, read> probe: Probe;
-@group(0) @binding(2) var<storage, read> positions: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read> normals: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read> curvatures: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read> materials: array<u32>;
-@group(0) @binding(6) var<storage, read> reflected: array<Reflected>;
-// The probe's parameterisation: the mesh's vertices, and two halves a pixel at half resolution.
-@group(0) @binding(7) var<storage, read> forward: array<vec2<f32>>;
+@group(0) @binding(3) var<storage, read> positions: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read> normals: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read> curvatures: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> materials: array<u32>;
+@group(0) @binding(7) var<storage, read> reflected: array<Reflected>;
+// The parameterisation's derivatives: two halves a pixel at half resolution.
 @group(0) @binding(8) var<storage, read> derivative: array<u32>;
 @group(0) @binding(9) var<storage, read> seen: array<Seen>;
 @group(0) @binding(10) var<storage, read> directions: array<Directions>;
@@ -109,29 +94,9 @@ const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
 // The best sample: its energy and texel as bits, and its probe.
 @group(0) @binding(15) var<storage, read_write> best: array<vec4<u32>>;
 
-// Index of an integer texel coordinate: wraps in x, clamps in y.
-fn texel_index(x: i32, y: i32) -> u32 {
-    let column = ((x % probe.size.x) + probe.size.x) % probe.size.x;
-    return u32(clamp(y, 0, probe.size.y - 1) * probe.size.x + column);
-}
-
 fn index_at(texel: vec2<f32>) -> u32 {
     let corner = vec2<i32>(floor(texel));
     return texel_index(corner.x, corner.y);
-}
-
-// Twin: probe::qhmap::ParameterMap::texel_from_direction.
-fn texel_from_direction(d: vec3<f32>) -> vec2<f32> {
-    let mesh = vec2<f32>(probe.mesh);
-    let p = lat_long_from_direction(d) * mesh;
-    let cell = min(vec2<i32>(p), probe.mesh - 1);
-    let t = p - vec2<f32>(cell);
-    let row = probe.mesh.x + 1;
-    let i = cell.y * row + cell.x;
-    let at = mix(mix(forward[i], forward[i + 1], t.x), mix(forward[i + row], forward[i + row + 1], t.x), t.y);
-    let size = vec2<f32>(probe.size);
-    let x = (at.x - floor(at.x)) * size.x;
-    return vec2(select(0.0, x, x < size.x), clamp(at.y, 0.0, 1.0) * size.y);
 }
 
 // Twin: probe::qhmap::ParameterMap::search_scale.

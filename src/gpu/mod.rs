@@ -5,6 +5,7 @@
 
 mod camera;
 mod commands;
+mod denoise;
 mod device;
 mod follow;
 mod kernel;
@@ -18,11 +19,12 @@ mod rays;
 mod render;
 mod scene;
 
+pub use denoise::{Denoiser, GpuGuides};
 pub use device::{Adapter, Choice, Gpu, adapters};
 pub(crate) use follow::{PathStart, SampleSum};
 pub use light::{LightPaths, LightStart};
 pub use path_trace::PathTracer;
 pub use probe::ProbePaths;
 pub use rays::RayTracer;
-pub use render::{BaselineFrame, Filter, ImageSpaceGather, LightmapRt, Renderer};
+pub use render::{BaselineFrame, Filter, ImageSpaceGather, LightmapRt, Renderer, Ulr};
 pub use scene::GpuScene;

@@ -27,10 +27,10 @@ const PATH: &str = r#"{"fov": 70, "size": [96, 54], "frames": [
     {"origin": [0, 0, 1.5], "target": [0, -0.5, 0]}, {"origin": [0.2, 0.1, 1.4], "target": [-0.3, -0.5, 0]}]}"#;
 
 /// A folder with baked probes, a light map and curvatures.
-struct Baked(tempfile::TempDir);
+pub struct Baked(tempfile::TempDir);
 
 impl Baked {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let baked = Self(tempfile::tempdir().unwrap());
         std::fs::write(baked.at("scene.xml"), SCENE).unwrap();
         std::fs::write(baked.at("path.json"), PATH).unwrap();
@@ -50,7 +50,7 @@ impl Baked {
     }
 
     /// Renders into the folder `name`.
-    fn render(&self, name: &str, device: &str, options: &str) -> Output {
+    pub fn render(&self, name: &str, device: &str, options: &str) -> Output {
         let inputs = "--probes out/probes --lightmap out/lightmap.exr --curvature out/curvature.exr --path path.json";
         let mut args = vec!["render-path", "scene.xml", "-o", name, "--device", device, "--json"];
         args.extend(inputs.split_whitespace().chain(options.split_whitespace()));
@@ -58,7 +58,7 @@ impl Baked {
     }
 
     /// The frames of the CPU and of the adapter, and the latter's timings.
-    fn both(&self, name: &str, options: &str) -> (Vec<[ExrImage; 2]>, Value) {
+    pub fn both(&self, name: &str, options: &str) -> (Vec<[ExrImage; 2]>, Value) {
         let device = device().unwrap();
         let folders = ["cpu", "gpu"].map(|d| format!("{name}-{d}"));
         let [_, gpu] = [0, 1].map(|i| {
@@ -71,11 +71,11 @@ impl Baked {
     }
 }
 
-fn text(bytes: &[u8]) -> String {
+pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-fn rmse(images: &[ExrImage; 2], layer: &str) -> f32 {
+pub fn rmse(images: &[ExrImage; 2], layer: &str) -> f32 {
     let [a, b] = images.each_ref().map(|i| i.rgb(Path::new(""), layer).unwrap());
     let sum: f32 = a.iter().zip(&b).map(|(a, b)| (*a - *b).length_squared()).sum();
     (sum / (3 * a.len()) as f32).sqrt()

@@ -2,10 +2,12 @@
 
 mod bakes;
 mod baselines;
+mod denoise;
 mod filter;
 mod frames;
 mod paths;
 mod rays;
+mod ulr;
 
 use reprobe::gpu::{Choice, Gpu, adapters};
 use reprobe::transport::World;

@@ -49,7 +49,7 @@ fn layers_and_full_images_are_the_cpus() {
 }
 
 /// A sphere of each scattering model, nested ones too, before every kind of emitter. No masks: whether a ray passes hangs on its last bit.
-fn zoo(folder: &std::path::Path) -> World {
+pub fn zoo(folder: &std::path::Path) -> World {
     let pixel = |x: u32, y: u32| image::Rgb([(40 + 30 * (x % 7)) as u8, (250 - 20 * (y % 9)) as u8, (150 + (x * y) % 101) as u8]);
     image::RgbImage::from_fn(16, 12, pixel).save(folder.join("map.png")).unwrap();
     let sky = (0..128).map(|i| if i == 37 { Rgb::splat(60.0) } else { Vec3::new(0.3, 0.4, 0.6) * (i % 16) as f32 / 8.0 });

@@ -97,7 +97,7 @@ impl Common {
             Choice::Auto | Choice::Cpu => Ok(()),
             Choice::Gpu | Choice::Named(_) => {
                 bail!(
-                    "--device: resmap, bake-probes, bake-lightmap, run, evaluate and render-path, but for its ulr, use a GPU; use --device cpu here"
+                    "--device: resmap, bake-probes, bake-lightmap, run, evaluate and render-path use a GPU; use --device cpu here"
                 )
             }
         }

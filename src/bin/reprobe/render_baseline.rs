@@ -7,7 +7,7 @@ use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
 use crate::views::View;
 use anyhow::{Context, bail};
-use reprobe::gpu::{BaselineFrame, ImageSpaceGather, LightmapRt};
+use reprobe::gpu::{BaselineFrame, ImageSpaceGather, LightmapRt, Ulr};
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
@@ -19,6 +19,7 @@ use reprobe::render::baseline::lightmap_rt::{LightmapRtParams, lightmap_rt};
 use reprobe::render::baseline::ulr::{UlrParams, nearest, ulr};
 use reprobe::render::composite::{diffuse_layer, downsample, emission_layer};
 use reprobe::render::gbuffer::{GBuffer, gbuffer};
+use reprobe::render::glossy_probes::Frame;
 use reprobe::render::path_trace::LayerImages;
 use reprobe::scene::Camera;
 use reprobe::surface::CurvatureMap;
@@ -85,7 +86,6 @@ fn from_gpu(frame: &BaselineFrame, image: ExrImage, times: &mut FrameTimings) ->
 }
 
 pub fn run_ulr(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
-    common.refuse_gpu()?;
     let params = apply(&UlrParams { supersample: args.supersample, ..UlrParams::default() }, &args.set)?;
     let setup = Setup::new(args, common, &mut timings, params.supersample)?;
     let folder = args.probes.as_ref().context("--method ulr needs --probes DIR, written by bake-probes")?;
@@ -98,7 +98,17 @@ pub fn run_ulr(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Re
         );
     }
     let provenance = setup.provenance.clone().with_input("probes", store.hash.clone());
+    let mut on_gpu = ulr_on_gpu(args, common, &setup, &params, store.set.size, &mut timings)?;
     let mut render = |view: &View, _: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {
+        if let Some(ulr) = &mut on_gpu {
+            let frame = ulr.frame(&view.camera, &mut store)?;
+            times.passes_ms.extend(frame.passes.iter().map(|&(pass, ms)| (pass.into(), ms)));
+            let sub_pixels = view.camera.size.iter().map(|&s| f64::from(s * params.supersample)).product::<f64>();
+            times.unserved_fraction = Some(frame.unserved as f64 / sub_pixels);
+            bar.advance(u64::from(view.camera.size[1]));
+            let Frame { emission, diffuse, glossy, .. } = frame;
+            return Ok(with_layers(image, &LayerImages { emission, diffuse, glossy }));
+        }
         let probes: Vec<_> = times.pass("load", || {
             let set = &store.set;
             let is_baked = |i: usize| !set.files[i].is_empty();
@@ -114,6 +124,31 @@ pub fn run_ulr(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Re
     let parameters = |_| json!({ "ulr": params });
     let method = frames::Method { world: &setup.world, provenance, samples: None, parameters: &parameters, render: &mut render };
     frames::render(args, common, timings, &setup.views, method)
+}
+
+/// The renderer on the GPU that `--device` asks for, with room for the largest of the views.
+fn ulr_on_gpu(
+    args: &Args,
+    common: &Common,
+    setup: &Setup,
+    params: &UlrParams,
+    probe: [u32; 2],
+    timings: &mut Timings,
+) -> anyhow::Result<Option<Ulr>> {
+    let ulr = common.on_gpu(|gpu| {
+        let mut ulr = Ulr::new(gpu, &setup.world, setup.lightmap.as_ref(), params, args.gpu_memory)?;
+        ulr.reserve(largest(&setup.views), probe)?;
+        Ok(ulr)
+    })?;
+    if let Some(ulr) = &ulr {
+        timings.device = Some(ulr.device().to_owned());
+        timings.clock = if ulr.has_clock() { "gpu" } else { "cpu" }.into();
+    }
+    Ok(ulr)
+}
+
+fn largest(views: &[View]) -> [u32; 2] {
+    views.iter().map(|v| v.camera.size).max_by_key(|[w, h]| w * h).unwrap_or([0, 0])
 }
 
 pub fn run_image_space_gather(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {

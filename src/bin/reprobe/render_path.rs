@@ -8,7 +8,7 @@ use crate::views::{FrameList, View, parse_frames, views};
 use crate::{render_baseline, render_glossy};
 use anyhow::bail;
 use clap::ValueEnum;
-use reprobe::gpu::{GpuScene, PathTracer};
+use reprobe::gpu::{Denoiser, GpuScene, PathTracer};
 use reprobe::io::{ExrImage, Provenance, atomic};
 use reprobe::progress::Progress;
 use reprobe::render::baseline::denoise::{DenoiseParams, denoise, guides};
@@ -77,7 +77,7 @@ pub struct Args {
     /// N x N rays a pixel through all passes, for all methods but path-trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub supersample: u32,
-    /// glossy-probes: memory that a GPU may be filled with, like 512M or 2G; probes past it are uploaded again
+    /// glossy-probes, ulr: memory that a GPU may be filled with, like 512M or 2G; probes past it are uploaded again
     #[arg(long, value_name = "SIZE", default_value = "2G", value_parser = parse_bytes)]
     pub gpu_memory: u64,
     /// glossy-probes: the paper's text in every choice
@@ -177,8 +177,12 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
     let (world, build_ms) = timed(|| World::new(scene));
     (timings.load_ms, timings.build_ms) = (load_ms, build_ms);
 
-    let tracer =
-        common.on_gpu(|gpu| PathTracer::new(Arc::new(GpuScene::new(gpu, &world)?), &path, args.layers == LayerChoice::All))?;
+    let on_gpu = common.on_gpu(|gpu| {
+        let scene = Arc::new(GpuScene::new(gpu, &world)?);
+        let denoiser = denoiser.map(|d| Denoiser::new(scene.clone(), &d)).transpose()?;
+        Ok((PathTracer::new(scene, &path, args.layers == LayerChoice::All)?, denoiser))
+    })?;
+    let (tracer, gpu_denoiser) = on_gpu.map_or((None, None), |(tracer, denoiser)| (Some(tracer), denoiser));
     timings.device = tracer.as_ref().map(|t| t.device().to_owned());
     let parameters = |spp| match &denoiser {
         None => json!({ "path_trace": PathTraceParams { spp, path }, "layers": args.layers }),
@@ -199,7 +203,10 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
             Some(tracer) => tracer.layers(camera, spp, seed, *frame, bar),
             None => Ok(path_trace(&world, camera, &params, seed, *frame, bar)),
         })?;
-        if let Some(d) = &denoiser {
+        if let Some(d) = &gpu_denoiser {
+            let guides = times.pass("guides", || d.guides(camera, spp, seed, *frame))?;
+            layers = times.pass("denoise", || d.denoise(&layers, &guides))?;
+        } else if let Some(d) = &denoiser {
             let guides = times.pass("guides", || guides(&world, camera, d, spp, seed, *frame));
             layers = times.pass("denoise", || denoise(&layers, &guides, camera.size[0] as usize, d));
         }

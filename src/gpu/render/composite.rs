@@ -30,7 +30,8 @@ struct Params {
 pub(super) struct Layers {
     /// Emission, diffuse and glossy.
     pub(super) planes: [wgpu::Buffer; 3],
-    unserved: wgpu::Buffer,
+    /// How many sub-pixels nothing served.
+    pub(super) unserved: wgpu::Buffer,
 }
 
 impl Layers {

@@ -132,7 +132,7 @@ impl Gather {
                 "gather.search: {levels} levels, but the GPU takes 1 to {LEVELS}; use --device cpu"
             )));
         }
-        let source = shader!("math", "perturb", "view", "gather");
+        let source = shader!("math", "perturb", "view", "probe", "gather");
         Ok(Self {
             params: params.clone(),
             find_anchors: Kernel::new(gpu, source, "find_anchors")?,
@@ -154,12 +154,12 @@ impl Gather {
         let buffers = [
             &params,
             &place,
+            &probe.forward,
             &view.positions,
             &view.guides.normals,
             &view.curvatures,
             &view.guides.materials,
             &view.reflected,
-            &probe.forward,
             &probe.derivative,
             &probe.seen,
             &probe.directions,
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
-        let source = shader!("math", "perturb", "view", "gather");
+        let source = shader!("math", "perturb", "view", "probe", "gather");
         check!(source, Perturb as "PerturbParams" { order, exact_plane, second_order_limit, min_focus });
         check!(source, Params as "Params" {
             eye, width, perturb, height, anchors, levels, bilinear, material_penalty, falloff, albedo_ratio, search

@@ -14,12 +14,14 @@ mod lightmap_rt;
 mod mirror;
 mod mirror_light;
 mod probes;
+mod ulr;
 mod view;
 
 pub use baseline::BaselineFrame;
 pub use filter::Filter;
 pub use image_space_gather::ImageSpaceGather;
 pub use lightmap_rt::LightmapRt;
+pub use ulr::Ulr;
 
 use super::Gpu;
 use super::commands::Commands;
@@ -45,7 +47,7 @@ use gbuffer::GBuffer;
 use glam::{Vec2, Vec4, Vec4Swizzles};
 use mirror::Mirror;
 use mirror_light::MirrorLight;
-use probes::{Place, Resident};
+use probes::{GpuProbe, Place, Resident};
 use std::sync::Arc;
 use view::{Guides, View};
 
@@ -65,6 +67,26 @@ fn bands([width, height]: [u32; 2], most: u64, steps: u64) -> impl Iterator<Item
     let rows = most / (u64::from(width) * steps.max(1)).max(1) / EDGE * EDGE;
     let rows = rows.clamp(EDGE, u64::from(height).max(EDGE)) as u32;
     (0..height).step_by(rows as usize).map(move |first| (first, rows))
+}
+
+fn area([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// What `frame` bytes for frames of `size` leave of the memory. An error where that is less than a probe's bytes.
+fn room_for_probes(memory: u64, size: [u32; 2], frame: u64, probe: u64) -> Result<u64> {
+    if frame + probe > memory {
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        return Err(Error::Request(format!(
+            "--gpu-memory: frames of {}x{} take {} MiB and a probe {} MiB, but {} MiB are allowed; give more, or use --device cpu",
+            size[0],
+            size[1],
+            mib(frame),
+            mib(probe),
+            mib(memory)
+        )));
+    }
+    Ok(memory - frame)
 }
 
 /// The buffers of frames of one size.
@@ -125,7 +147,7 @@ pub struct Renderer<'a> {
     filter: Filter,
     composite: Composite,
     coverage: Option<Coverage>,
-    resident: Resident,
+    resident: Resident<GpuProbe>,
     target: Option<Target>,
 }
 
@@ -197,21 +219,8 @@ impl<'a> Renderer<'a> {
         if let Some(target) = self.target.take().filter(|t| t.view.size == fine) {
             return Ok(target);
         }
-        let area = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
         let frame = area(fine) * Target::BYTES + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
-        let probe = area(probe) * probes::TEXEL;
-        if frame + probe > self.memory {
-            let mib = |bytes: u64| bytes.div_ceil(1 << 20);
-            return Err(Error::Request(format!(
-                "--gpu-memory: frames of {}x{} take {} MiB and a probe {} MiB, but {} MiB are allowed; give more, or use --device cpu",
-                size[0],
-                size[1],
-                mib(frame),
-                mib(probe),
-                mib(self.memory)
-            )));
-        }
-        self.resident.set_budget(self.memory - frame);
+        self.resident.set_budget(room_for_probes(self.memory, size, frame, area(probe) * probes::TEXEL)?);
         Target::new(&self.gpu, fine, &self.params)
     }
 
@@ -240,11 +249,11 @@ impl<'a> Renderer<'a> {
         }
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
-        let candidates = |probe: &Probe| Candidates::new(self.world, probe, albedos, mirrors);
+        let upload = |probe: &Probe| GpuProbe::upload(gpu, probe, &Candidates::new(self.world, probe, albedos, mirrors));
         for (index, weight) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
             clock.restart();
             let probe = probes.probe(index)?;
-            let there = self.resident.get(gpu, index, &probe, || candidates(&probe))?;
+            let there = self.resident.get(gpu, index, probes::bytes(&probe), || upload(&probe))?;
             clock.lap("load");
             self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &Place::new(index, &probe, weight)), &t.sums)?;
         }
@@ -272,7 +281,7 @@ impl<'a> Renderer<'a> {
         for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
             // What fails here fails again when that frame is rendered.
             if let Ok(probe) = probes.probe(index) {
-                self.resident.upload_ahead(gpu, index, &probe, || candidates(&probe))?;
+                self.resident.upload_ahead(gpu, index, probes::bytes(&probe), || upload(&probe))?;
             }
         }
         clock.lap("load");

@@ -15,7 +15,6 @@ pub(super) struct GpuProbe {
     pub(super) seen: wgpu::Buffer,
     pub(super) directions: wgpu::Buffer,
     pub(super) light: wgpu::Buffer,
-    bytes: u64,
 }
 
 /// A probe's place and weight in one frame.
@@ -38,14 +37,13 @@ impl Place {
 }
 
 impl GpuProbe {
-    fn upload(gpu: &Gpu, probe: &Probe, candidates: &Candidates) -> Result<Self> {
+    pub(super) fn upload(gpu: &Gpu, probe: &Probe, candidates: &Candidates) -> Result<Self> {
         Ok(Self {
             forward: gpu.upload("a probe's map", bytemuck::cast_slice(&probe.map.forward))?,
             derivative: gpu.upload("a probe's derivatives", bytemuck::cast_slice(&probe.map.derivative))?,
             seen: gpu.upload("a probe's reflected hits", bytemuck::cast_slice(&candidates.seen))?,
             directions: gpu.upload("a probe's directions", bytemuck::cast_slice(&candidates.directions))?,
             light: gpu.upload("a probe's colours", bytemuck::cast_slice(&candidates.light))?,
-            bytes: bytes(probe),
         })
     }
 }
@@ -53,16 +51,16 @@ impl GpuProbe {
 /// Bytes a texel, but for the map.
 pub(super) const TEXEL: u64 = (size_of::<Seen>() + size_of::<Directions>() + size_of::<Light>()) as u64;
 
-/// What a probe takes on a device.
-fn bytes(probe: &Probe) -> u64 {
+/// What a gathered probe takes on a device, bytes.
+pub(super) fn bytes(probe: &Probe) -> u64 {
     let map = size_of_val(probe.map.forward.as_slice()) + size_of_val(probe.map.derivative.as_slice());
     probe.texels.len() as u64 * TEXEL + map as u64
 }
 
-/// The probes used last.
-pub(super) struct Resident {
-    /// By index, with the time of its last use.
-    probes: BTreeMap<usize, (u64, Rc<GpuProbe>)>,
+/// The probes used last, as a method reads them.
+pub(super) struct Resident<T> {
+    /// By index, with the time of its last use, and its bytes.
+    probes: BTreeMap<usize, (u64, u64, Rc<T>)>,
     /// Bytes that they may take.
     budget: u64,
     clock: u64,
@@ -70,7 +68,7 @@ pub(super) struct Resident {
     frame: u64,
 }
 
-impl Resident {
+impl<T> Resident<T> {
     pub(super) fn new(budget: u64) -> Self {
         Self { probes: BTreeMap::new(), budget, clock: 0, frame: 0 }
     }
@@ -82,7 +80,7 @@ impl Resident {
 
     /// Bytes that the probes take.
     pub(super) fn bytes(&self) -> u64 {
-        self.probes.values().map(|(_, p)| p.bytes).sum()
+        self.probes.values().map(|(_, bytes, _)| bytes).sum()
     }
 
     /// Begins a frame.
@@ -90,35 +88,24 @@ impl Resident {
         self.frame = self.clock;
     }
 
-    /// A probe; uploaded where it is not there, in place of those used longest ago. One that is larger than the whole budget is alone.
-    pub(super) fn get(
-        &mut self,
-        gpu: &Gpu,
-        index: usize,
-        probe: &Probe,
-        candidates: impl FnOnce() -> Candidates,
-    ) -> Result<Rc<GpuProbe>> {
+    /// A probe; where it is not there, `upload` puts its `bytes` in place of those used longest ago. One that is larger than the whole
+    /// budget is alone.
+    pub(super) fn get(&mut self, gpu: &Gpu, index: usize, bytes: u64, upload: impl FnOnce() -> Result<T>) -> Result<Rc<T>> {
         self.clock += 1;
-        if let Some((used, there)) = self.probes.get_mut(&index) {
+        if let Some((used, _, there)) = self.probes.get_mut(&index) {
             *used = self.clock;
             return Ok(there.clone());
         }
-        self.make_room(gpu, bytes(probe), u64::MAX);
-        let there = Rc::new(GpuProbe::upload(gpu, probe, &candidates())?);
-        self.probes.insert(index, (self.clock, there.clone()));
+        self.make_room(gpu, bytes, u64::MAX);
+        let there = Rc::new(upload()?);
+        self.probes.insert(index, (self.clock, bytes, there.clone()));
         Ok(there)
     }
 
     /// Uploads a probe that a later frame needs, unless a probe of this one would have to go.
-    pub(super) fn upload_ahead(
-        &mut self,
-        gpu: &Gpu,
-        index: usize,
-        probe: &Probe,
-        candidates: impl FnOnce() -> Candidates,
-    ) -> Result<()> {
-        if !self.probes.contains_key(&index) && self.make_room(gpu, bytes(probe), self.frame + 1) {
-            self.get(gpu, index, probe, candidates)?;
+    pub(super) fn upload_ahead(&mut self, gpu: &Gpu, index: usize, bytes: u64, upload: impl FnOnce() -> Result<T>) -> Result<()> {
+        if !self.probes.contains_key(&index) && self.make_room(gpu, bytes, self.frame + 1) {
+            self.get(gpu, index, bytes, upload)?;
         }
         Ok(())
     }
@@ -127,8 +114,8 @@ impl Resident {
     fn make_room(&mut self, gpu: &Gpu, needed: u64, time: u64) -> bool {
         let mut dropped = false;
         while self.bytes() + needed > self.budget {
-            let old = self.probes.iter().filter(|(_, (used, _))| *used < time);
-            let Some(oldest) = old.min_by_key(|(_, (used, _))| *used).map(|(i, _)| *i) else { break };
+            let old = self.probes.iter().filter(|(_, (used, ..))| *used < time);
+            let Some(oldest) = old.min_by_key(|(_, (used, ..))| *used).map(|(i, _)| *i) else { break };
             self.probes.remove(&oldest);
             dropped = true;
         }
@@ -148,8 +135,7 @@ mod tests {
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
-        let source = shader!("math", "perturb", "view", "gather");
-        check!(source, Place as "Probe" { position, weight, size, mesh, index });
+        check!(shader!("math", "probe"), Place as "Probe" { position, weight, size, mesh, index });
         assert_eq!(TEXEL, 72);
     }
 }

@@ -22,13 +22,15 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Camera rays that a pixel's guides are the mean of, at the most.
-const GUIDE_SAMPLES: u32 = 8;
+pub(crate) const GUIDE_SAMPLES: u32 = 8;
 /// Least albedo that light is divided by.
 const MIN_ALBEDO: f32 = 0.02;
 /// Depth that stands for the environment, in units of nothing: farther than all.
 const FAR: f32 = 1e4;
 /// Most levels: holes of 4096 pixels.
-const MOST_LEVELS: u32 = 12;
+pub(crate) const MOST_LEVELS: u32 = 12;
+/// Pixels that a despeckled one is compared with.
+pub(crate) const NEIGHBOURS: u32 = 24;
 /// One row of the B3 spline.
 const SPLINE: [f32; 5] = [1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 

@@ -110,18 +110,19 @@ fn blend(world: &World, eye: Vec3, pixel: &Pixel, probes: &[Arc<Probe>], params:
     let mut order: Vec<(f32, usize)> = probes.iter().map(|probe| penalty(eye, p, probe.position, params)).zip(0..).collect();
     order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let (mut seen, mut hidden) = (Vec::new(), Vec::new());
+    let most = params.blend.max(1) as usize;
     for (q, i) in order {
         match look(world, pixel, &probes[i], params) {
             Some((color, true)) => seen.push((q, color)),
             Some((color, false)) => hidden.push((q + params.hidden, color)),
             None => {}
         }
-        if seen.len() == params.blend as usize {
+        if seen.len() == most {
             break;
         }
     }
     seen.extend(hidden);
-    seen.truncate(params.blend.max(1) as usize);
+    seen.truncate(most);
     let penalties: Vec<f32> = seen.iter().map(|s| s.0).collect();
     let (mut sum, mut total) = (Rgb::ZERO, 0.0);
     for (weight, (_, color)) in weights(&penalties).zip(&seen) {

@@ -1,0 +1,38 @@
+// A probe in a frame, and its parameterisation. Twin: src/probe/qhmap.rs. Follows math.wgsl.
+
+// Struct: gpu::render::probes::Place.
+struct Probe {
+    position: vec3<f32>,
+    // t_i.
+    weight: f32,
+    size: vec2<i32>,
+    mesh: vec2<i32>,
+    index: u32,
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
+}
+
+@group(0) @binding(1) var<storage, read> probe: Probe;
+// The vertices of the lat-long mesh in the probe.
+@group(0) @binding(2) var<storage, read> forward: array<vec2<f32>>;
+
+// Index of an integer texel coordinate: wraps in x, clamps in y.
+fn texel_index(x: i32, y: i32) -> u32 {
+    let column = ((x % probe.size.x) + probe.size.x) % probe.size.x;
+    return u32(clamp(y, 0, probe.size.y - 1) * probe.size.x + column);
+}
+
+// Twin: probe::qhmap::ParameterMap::texel_from_direction.
+fn texel_from_direction(d: vec3<f32>) -> vec2<f32> {
+    let mesh = vec2<f32>(probe.mesh);
+    let p = lat_long_from_direction(d) * mesh;
+    let cell = min(vec2<i32>(p), probe.mesh - 1);
+    let t = p - vec2<f32>(cell);
+    let row = probe.mesh.x + 1;
+    let i = cell.y * row + cell.x;
+    let at = mix(mix(forward[i], forward[i + 1], t.x), mix(forward[i + row], forward[i + row + 1], t.x), t.y);
+    let size = vec2<f32>(probe.size);
+    let x = (at.x - floor(at.x)) * size.x;
+    return vec2(select(0.0, x, x < size.x), clamp(at.y, 0.0, 1.0) * size.y);
+}
