@@ -31,8 +31,8 @@ pub struct BakeParams {
     /// Standard error at which a texel is done, in units of its luminance plus [`ERROR_FLOOR`]; `None` gives each `spp` paths. *Ours*.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<f32>,
-    /// Multiplies alpha at the first vertex. *Paper* (§6.1): 0.5, [`PAPER_ROUGHNESS_SCALE`]. *Ours*: 0.75, which leaves the filter less to
-    /// guess: 4 to 20 % less error on each of four scenes.
+    /// Multiplies alpha at the first vertex. *Paper* (§6.1): 0.5, [`PAPER_ROUGHNESS_SCALE`]. *Ours*: 1, the material's own:
+    /// what the paths have integrated the filter need not guess, and what it then blurs is noise (`footprint.roughness_scale`).
     pub roughness_scale: f32,
     /// Spread the samples over the texel's solid angle, as far as it shows the reflector that its centre shows, in place of
     /// sending all through the centre. *Ours*. A spread texel mixes what a mirror shows on both sides of an edge, and the gather
@@ -42,7 +42,7 @@ pub struct BakeParams {
 
 impl Default for BakeParams {
     fn default() -> Self {
-        Self { spp: 2048, error: None, roughness_scale: 0.75, spread: false }
+        Self { spp: 2048, error: None, roughness_scale: 1.0, spread: false }
     }
 }
 

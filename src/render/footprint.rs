@@ -7,6 +7,9 @@
 //! The table holds standard deviations at focal length 1 (tangents of angles), so that a frame's own focal length in pixels converts them, and so
 //! that interpolation is of a nearly linear function. Distances past its ends are clamped to them.
 //!
+//! Ours: probes of full roughness lack nothing of the lobe, but have noise, texels, and edges sharpened by parallax. A filter that counts
+//! them as baked at 0.95 takes these away, by a third of the lobe's own width, for a lobe that is wider by a twentieth.
+//!
 //! Foreshortening, derived. With the notation of [`super::perturb`], moving by u on the reflector tilts the half vector by G u / (2 cos θ), since G is
 //! the derivative of the tangential part of e_p + e_q, whose normal part is 2 cos θ. On a plane G = c (I - e eᵀ), c = 1/d_c + 1/d_r: along the plane of
 //! incidence the tilt is c cos θ / 2, across it c / (2 cos θ). The image shows a step along as cos θ / d_c, a step across as 1 / d_c. So
@@ -64,7 +67,8 @@ pub enum Foreshortening {
 pub struct FootprintParams {
     /// Fit of the table.
     pub fit: Fit,
-    /// Alpha of the probes' first vertex over the material's own. Paper: 0.5.
+    /// Alpha of the probes' first vertex over the material's own: the most that the filter takes them to have, whatever they were
+    /// baked at ([`Self::for_probes`]), in [0, 1]. Paper: 1, as baked; ours, 0.95.
     pub roughness_scale: f32,
     /// Below this d_r, the variance is scaled by d_r over it; 0: never, m. Paper: 0.5, without saying how.
     pub small_d_r: f32,
@@ -76,14 +80,19 @@ pub struct FootprintParams {
 
 impl Default for FootprintParams {
     fn default() -> Self {
-        Self { fit: Fit::Slice, roughness_scale: 0.5, small_d_r: 0.0, foreshortening: Foreshortening::Curved, fov_degrees: 70.0 }
+        Self { fit: Fit::Slice, roughness_scale: 0.95, small_d_r: 0.0, foreshortening: Foreshortening::Curved, fov_degrees: 70.0 }
     }
 }
 
 impl FootprintParams {
     /// The paper's text.
     pub fn paper() -> Self {
-        Self { fit: Fit::Moment, small_d_r: 0.5, foreshortening: Foreshortening::Paper, ..Self::default() }
+        Self { fit: Fit::Moment, roughness_scale: 1.0, small_d_r: 0.5, foreshortening: Foreshortening::Paper, ..Self::default() }
+    }
+
+    /// The parameters for probes that were baked at `roughness_scale`.
+    pub fn for_probes(self, roughness_scale: f32) -> Self {
+        Self { roughness_scale: self.roughness_scale.min(roughness_scale), ..self }
     }
 }
 

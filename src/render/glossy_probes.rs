@@ -117,7 +117,7 @@ pub struct Renderer<'a> {
 }
 
 impl<'a> Renderer<'a> {
-    /// Tabulates the footprints (§6.1) that probes baked at `roughness_scale` leave to the filter.
+    /// Tabulates the footprints (§6.1) that probes baked at `roughness_scale` leave to the filter ([`FootprintParams::for_probes`]).
     pub fn new(
         world: &'a World,
         curvature: &'a CurvatureMap,
@@ -125,7 +125,7 @@ impl<'a> Renderer<'a> {
         params: GlossyProbeParams,
         roughness_scale: f32,
     ) -> Self {
-        let footprint = params.footprint.map(|f| Footprint::new(&FootprintParams { roughness_scale, ..f }));
+        let footprint = params.footprint.map(|f| Footprint::new(&f.for_probes(roughness_scale)));
         Self {
             world,
             curvature,

@@ -52,7 +52,7 @@ pub struct Args {
     /// Trace a texel until its standard error is this fraction of its luminance, by the variance of its first 8 paths and its neighbours'
     #[arg(long, value_name = "E")]
     error: Option<f32>,
-    /// Factor on roughness at the first glossy vertex [default: 0.75; with --paper 0.5]
+    /// Factor on roughness at the first glossy vertex [default: 1; with --paper 0.5]
     #[arg(long, value_name = "S")]
     roughness_scale: Option<f32>,
     /// Spread a texel's paths over its solid angle, in place of sending all through its centre

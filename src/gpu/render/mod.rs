@@ -30,7 +30,6 @@ use crate::lightmap::LightMap;
 use crate::probe::file::Probe;
 use crate::probe::store::ProbeStore;
 use crate::render::candidates::Candidates;
-use crate::render::footprint::FootprintParams;
 use crate::render::gather::Gathered;
 use crate::render::glossy_probes::{Buffers, Clock, Frame, GlossyProbeParams, nearest_probes};
 use crate::render::mirror_light::PERFECT;
@@ -163,7 +162,7 @@ impl<'a> Renderer<'a> {
         memory: u64,
     ) -> Result<Self> {
         let footprint = params.footprint.map(|f| {
-            let table = crate::render::footprint::Footprint::new(&FootprintParams { roughness_scale, ..f });
+            let table = crate::render::footprint::Footprint::new(&f.for_probes(roughness_scale));
             Footprint::new(&gpu, &table)
         });
         let scene = GpuScene::new(gpu.clone(), world)?;

@@ -8,7 +8,7 @@ fn default_table() -> Footprint {
 
 fn paper_table() -> Footprint {
     static TABLE: std::sync::OnceLock<Footprint> = std::sync::OnceLock::new();
-    TABLE.get_or_init(|| Footprint::new(&FootprintParams::paper())).clone()
+    TABLE.get_or_init(|| Footprint::new(&FootprintParams::paper().for_probes(0.5))).clone()
 }
 
 #[test]
@@ -144,15 +144,19 @@ fn a_sphere_narrows_the_footprint_as_brute_force_says() {
 fn the_filter_adds_what_the_probes_lack() {
     let (camera, n) = slanted(0.5);
     let plane = Curvature::plane(n);
-    let table = default_table();
-    let at = |alpha: f32| {
+    let at = |params: FootprintParams, alpha: f32| {
         let point = GlossyPoint { x: Vec3::ZERO, n, reflected_distance: 2.0, alpha, curvature: &plane };
-        table.covariance(&camera, &point)
+        Footprint { params, ..default_table() }.covariance(&camera, &point)
     };
-    assert_eq!(at(0.0), [0.0; 3], "a mirror stays sharp");
-    // Nearly three quarters of the variance, for a lobe whose width grows with alpha.
+    assert_eq!(at(FootprintParams::default(), 0.0), [0.0; 3], "a mirror stays sharp");
     let full = full_covariance(&camera, n, 2.0, 0.1, 0.0, Foreshortening::Derived);
-    assert!((at(0.1)[0] / full[0] - 0.75).abs() < 0.02, "{} of {}", at(0.1)[0], full[0]);
+    // What the probes were baked at, and the share of the variance that is left; full roughness counts as 0.95.
+    for (baked, left) in [(0.5, 0.75), (0.75, 0.4375), (1.0, 0.0975)] {
+        let found = at(FootprintParams::default().for_probes(baked), 0.1)[0];
+        // Less by a little, as a lobe's width falls behind alpha.
+        assert!((found / full[0] - left).abs() < 0.02, "{baked}: {found} of {}", full[0]);
+    }
+    assert_eq!(at(FootprintParams::paper().for_probes(1.0), 0.1), [0.0; 3], "nothing is lacking");
 }
 
 #[test]
