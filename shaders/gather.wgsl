@@ -16,7 +16,6 @@ struct Params {
     material_penalty: f32,
     falloff: f32,
     albedo_ratio: u32,
-    padding: u32,
     // Radius and step of each level.
     search: array<vec2<f32>, 8>,
 }
