@@ -16,7 +16,6 @@ struct Params {
     material_penalty: f32,
     falloff: f32,
     albedo_ratio: u32,
-    padding: u32,
     // Radius and step of each level.
     search: array<vec2<f32>, 8>,
 }
@@ -71,7 +70,6 @@ struct Target {
 const NEAREST: u32 = 0u;
 const SAME_REFLECTOR: u32 = 1u;
 const TILE: u32 = 16u;
-const MIN_TRILINEAR: f32 = 1e-6;
 const ANCHOR_TOLERANCE: vec2<f32> = vec2(3.0, 0.1);
 const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
 
@@ -300,6 +298,6 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
         least = found.energy;
         best[i] = vec4(bitcast<u32>(found.energy), bitcast<vec2<u32>>(found.texel), probe.index);
     }
-    let weight = max(probe.weight, MIN_TRILINEAR) * exp(-params.falloff * (found.energy - least));
+    let weight = probe.weight * exp(-params.falloff * (found.energy - least));
     sums[i] = sum + vec4(color, 1.0) * weight;
 }

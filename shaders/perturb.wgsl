@@ -7,12 +7,14 @@ struct PerturbParams {
     exact_plane: u32,
     second_order_limit: f32,
     min_focus: f32,
+    newton: u32,
 }
 
 const ORDER_PLANE: u32 = 0u;
 const ORDER_FIRST: u32 = 1u;
 const ORDER_SECOND: u32 = 2u;
 const MIN_COS: f32 = 1e-3;
+const MAX_STEP: f32 = 0.5;
 const MIN_DISTANCE: f32 = 1e-4;
 
 // Principal curvatures, and the direction of the first.
@@ -93,6 +95,47 @@ fn second_order(path: Perturbation, dp: vec3<f32>, u: vec2<f32>) -> vec2<f32> {
     return -(path.g_inverse * sum);
 }
 
+// The point of least |F| among `start` and the Newton steps from it, for the eye at `p` (local).
+fn newton(path: Perturbation, start: vec2<f32>, p: vec3<f32>, steps: u32) -> vec2<f32> {
+    let to_q = vec3(-path.e.xy, path.e.z);
+    let farthest = MAX_STEP / max(abs(path.k.x), abs(path.k.y));
+    var u = start;
+    var best = start;
+    var least = FAR;
+    for (var step = 0u; step <= steps; step++) {
+        let bend = path.k * u;
+        let s = vec3(u, -0.5 * dot(u, bend));
+        let s1 = vec3(1.0, 0.0, -bend.x);
+        let s2 = vec3(0.0, 1.0, -bend.y);
+        var slope = vec2(0.0);
+        // Upper triangle of the Hessian.
+        var h = vec3(0.0);
+        for (var end = 0; end < 2; end++) {
+            let a = select(to_q - s * path.inv_rq, p - s, end == 0);
+            let inv_length = 1.0 / max(length(a), MIN_DISTANCE);
+            let e = a * inv_length;
+            let inv_r = select(path.inv_rq, 1.0, end == 0) * inv_length;
+            let along = vec2(dot(e, s1), dot(e, s2));
+            slope -= along;
+            h.x += (dot(s1, s1) - along.x * along.x) * inv_r + path.k.x * e.z;
+            h.y += (dot(s1, s2) - along.x * along.y) * inv_r;
+            h.z += (dot(s2, s2) - along.y * along.y) * inv_r + path.k.y * e.z;
+        }
+        let size = dot(slope, slope) / (1.0 + dot(bend, bend));
+        if size < least {
+            best = u;
+            least = size;
+        }
+        let du = vec2(h.z * slope.x - h.y * slope.y, h.x * slope.y - h.y * slope.x) / (h.x * h.z - h.y * h.y);
+        if step == steps || !(is_finite(du.x) && is_finite(du.y)) {
+            break;
+        }
+        let limit = farthest + 0.5 * length(u);
+        u -= du * min(1.0, limit / max(length(du), 1e-30));
+    }
+    return best;
+}
+
 // x': where the reflector shows q to the eye at p.
 fn reflection_point(path: Perturbation, p: vec3<f32>, params: PerturbParams) -> vec3<f32> {
     let dp = to_local(path.frame, p - path.p);
@@ -112,6 +155,9 @@ fn reflection_point(path: Perturbation, p: vec3<f32>, params: PerturbParams) -> 
     }
     if !(is_finite(u.x) && is_finite(u.y)) {
         u = vec2(0.0);
+    }
+    if params.newton > 0u && any(path.k != vec2(0.0)) {
+        u = newton(path, u, to_local(path.frame, p - path.x), params.newton);
     }
     let height = -0.5 * (path.k.x * u.x * u.x + path.k.y * u.y * u.y);
     return path.x + to_world(path.frame, vec3(u, height));

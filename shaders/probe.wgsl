@@ -3,7 +3,7 @@
 // Struct: gpu::render::probes::Place.
 struct Probe {
     position: vec3<f32>,
-    // t_i.
+    // At equal energy.
     weight: f32,
     size: vec2<i32>,
     mesh: vec2<i32>,

@@ -160,7 +160,7 @@ fn inputs_from_another_scene_or_another_run_are_refused() {
     assert!(message.contains("other views") && message.contains("--for-path"), "{message}");
     f.figures(&render("--frames 1"));
     let message = f.refusal(&render("--set gather.falof=3"));
-    assert!(message.contains("gather.falloff=16"), "{message}");
+    assert!(message.contains("gather.falloff=128"), "{message}");
 
     // Another camera is no other scene, another colour is.
     std::fs::write(f.at("scene.xml"), SCENE.replace("0, 0, 1.5\"", "0, 0.1, 1.5\"")).unwrap();

@@ -43,8 +43,8 @@ pub struct Views {
 
 /// `gather` without what only decides what is made of the texels.
 fn choice(gather: &GatherParams) -> GatherParams {
-    let GatherParams { falloff, bilinear, albedo_ratio, .. } = GatherParams::paper();
-    GatherParams { falloff, bilinear, albedo_ratio, ..gather.clone() }
+    let GatherParams { falloff, trilinear_power, bilinear, albedo_ratio, .. } = GatherParams::paper();
+    GatherParams { falloff, trilinear_power, bilinear, albedo_ratio, ..gather.clone() }
 }
 
 /// Whether the texels of one choice are among those of another: that of as many probes or more, all else alike.

@@ -55,8 +55,12 @@ pub struct GatherParams {
     pub anchors: usize,
     /// s_a, the factor on the energy where the reflected materials differ. *Paper*: 10.
     pub material_penalty: f32,
-    /// φ, the falloff of a sample's weight with its energy (Eq. 2). *Paper*: 8. *Ours*: 16.
+    /// φ, the falloff of a sample's weight with its energy (Eq. 2). *Paper*: 8. *Ours*: 128.
     pub falloff: f32,
+    /// The power of t_i that counts as a probe's weight: below 1, the nearest probe outweighs the others less, and all still come
+    /// and go without a jump. *Paper*: 1. *Ours*: 0.5.
+    #[serde(default = "as_it_is")]
+    pub trilinear_power: f32,
     /// How many of the eight nearest probes are asked, those of largest weight first. *Paper*: 8.
     pub probes: usize,
     /// How the reflection point is predicted (§5.1).
@@ -72,6 +76,11 @@ fn every_pixel() -> usize {
     1
 }
 
+/// The same of the weights' power.
+fn as_it_is() -> f32 {
+    1.0
+}
+
 impl Default for GatherParams {
     fn default() -> Self {
         let paper = Self::paper();
@@ -79,7 +88,8 @@ impl Default for GatherParams {
         Self {
             search: [paper.search, vec![finest]].concat(),
             anchors: 4,
-            falloff: 16.0,
+            falloff: 128.0,
+            trilinear_power: 0.5,
             bilinear: BilinearRule::SameReflectorAndReflected,
             albedo_ratio: true,
             perturb: PerturbParams::default(),
@@ -96,11 +106,17 @@ impl GatherParams {
             anchors: 1,
             material_penalty: 10.0,
             falloff: 8.0,
+            trilinear_power: 1.0,
             probes: 8,
             perturb: PerturbParams::paper(),
             bilinear: BilinearRule::SameReflector,
             albedo_ratio: false,
         }
+    }
+
+    /// A probe's weight at equal energy, for its trilinear weight t_i.
+    pub(crate) fn probe_weight(&self, t: f32) -> f32 {
+        t.powf(self.trilinear_power).max(MIN_WEIGHT)
     }
 }
 
@@ -113,8 +129,8 @@ fn reflected_distance(view: &Reflected, probe: &Reflected) -> f32 {
 /// Side of a tile of pixels: what their searches read of a probe, some 100 KB, fits into a core's cache.
 pub(crate) const TILE: usize = 16;
 
-/// Least t_i: a probe at the far side of the cell still serves a pixel that no other serves.
-const MIN_TRILINEAR: f32 = 1e-6;
+/// Least weight: a probe at the far side of the cell still serves a pixel that no other serves.
+const MIN_WEIGHT: f32 = 1e-6;
 
 /// A gathered pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -298,7 +314,7 @@ fn blend(
     let (mut sum, mut z) = (Rgb::ZERO, 0.0);
     let albedo = params.albedo_ratio.then(|| view_albedo(world, pixel, roughness_scale));
     for (w, sample) in found() {
-        let weight = w.weight.max(MIN_TRILINEAR) * (-params.falloff * (sample.energy - best.energy)).exp();
+        let weight = params.probe_weight(w.weight) * (-params.falloff * (sample.energy - best.energy)).exp();
         let mut color = fetch(w, sample.texel, params.bilinear);
         if let Some(view) = albedo {
             color *= albedo_ratio(view, w, sample.texel);

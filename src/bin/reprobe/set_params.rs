@@ -82,7 +82,7 @@ mod tests {
         assert_eq!(set("gather.search.0.radius=1").unwrap().gather.search[0].radius, 1);
         assert!(set("footprint=null").unwrap().footprint.is_none());
         let message = set("gather.fallof=4").unwrap_err().to_string();
-        assert!(message.contains("gather.falloff=16"), "{message}");
+        assert!(message.contains("gather.falloff=128"), "{message}");
         assert!(set("gather.falloff=many").is_err());
         assert!(set("gather.falloff").is_err());
         let paper = GlossyProbeParams::paper();

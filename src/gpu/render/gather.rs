@@ -26,6 +26,7 @@ struct Perturb {
     exact_plane: u32,
     second_order_limit: f32,
     min_focus: f32,
+    newton: u32,
 }
 
 impl Perturb {
@@ -35,8 +36,8 @@ impl Perturb {
             Order::First => 1,
             Order::Second => 2,
         };
-        let PerturbParams { second_order_limit, min_focus, .. } = *params;
-        Self { order, exact_plane: params.exact_plane.into(), second_order_limit, min_focus }
+        let PerturbParams { second_order_limit, min_focus, newton, .. } = *params;
+        Self { order, exact_plane: params.exact_plane.into(), second_order_limit, min_focus, newton }
     }
 }
 
@@ -54,7 +55,6 @@ struct Params {
     material_penalty: f32,
     falloff: f32,
     albedo_ratio: u32,
-    padding: u32,
     search: [[f32; 2]; LEVELS],
 }
 
@@ -79,7 +79,6 @@ impl Params {
             material_penalty: params.material_penalty,
             falloff: params.falloff,
             albedo_ratio: params.albedo_ratio.into(),
-            padding: 0,
             search,
         }
     }
@@ -186,7 +185,7 @@ mod tests {
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
         let source = shader!("math", "perturb", "view", "probe", "gather");
-        check!(source, Perturb as "PerturbParams" { order, exact_plane, second_order_limit, min_focus });
+        check!(source, Perturb as "PerturbParams" { order, exact_plane, second_order_limit, min_focus, newton });
         check!(source, Params as "Params" {
             eye, width, perturb, height, anchors, levels, bilinear, material_penalty, falloff, albedo_ratio, search
         });

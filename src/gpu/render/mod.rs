@@ -249,12 +249,13 @@ impl<'a> Renderer<'a> {
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
         let upload = |probe: &Probe| GpuProbe::upload(gpu, probe, &Candidates::new(self.world, probe, albedos, mirrors));
-        for (index, weight) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
+        for (index, t_i) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
             clock.restart();
             let probe = probes.probe(index)?;
             let there = self.resident.get(gpu, index, probes::bytes(&probe), || upload(&probe))?;
             clock.lap("load");
-            self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &Place::new(index, &probe, weight)), &t.sums)?;
+            let place = Place::new(index, &probe, params.gather.probe_weight(t_i));
+            self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &place), &t.sums)?;
         }
         let previous = (t.last_camera.as_ref(), &t.last, &t.glossy);
         self.composite.fill(gpu, &mut commands, (&t.view, &fine, &t.gathered), &t.sums, previous, &t.layers)?;

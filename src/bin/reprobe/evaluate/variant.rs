@@ -150,7 +150,14 @@ pub fn paper(probes: u32) -> Result<Vec<Variant>, String> {
             "Fig. 13",
             "perturbation of first order, no filter",
             "unfiltered",
-            format!("{unfiltered},gather.perturb.order=first"),
+            format!("{unfiltered},gather.perturb.order=first,gather.perturb.newton=0"),
+        ),
+        (
+            "second-order",
+            "Fig. 13",
+            "perturbation of second order without Newton steps, no filter",
+            "unfiltered",
+            format!("{unfiltered},gather.perturb.newton=0"),
         ),
         (
             "small-search",
