@@ -55,9 +55,10 @@ fn checked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule {
 fn unchecked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule {
     let source = wgpu::ShaderSource::Wgsl(source.into());
     let descriptor = wgpu::ShaderModuleDescriptor { label: Some(entry), source };
-    // SAFETY: every index is one of three kinds. Invocations past a list's end return first. Numbers of nodes, triangles, materials, models,
+    // SAFETY: every index is one of four kinds. Invocations past a list's end return first. Numbers of nodes, triangles, materials, models,
     // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there; those of triangles
-    // at which paths start come from hits of the same scene, and those of probes' texels were tested when the probe was read. Pixels, texels and table entries that are computed from coordinates are wrapped
+    // at which paths start come from hits of the same scene, and those of probes' texels were tested when the probe was read. Samples that a pixel
+    // keeps are numbered below their most. Pixels, texels and table entries that are computed from coordinates are wrapped
     // or clamped to their image or table, after the coordinates were tested for numbers. The traversal's stack is no deeper than `STACK`,
     // which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the root down or up, or end with a path's depth, which
     // the roulette bounds or its limit. Builds with debug assertions, so all tests, run the same kernels checked.
