@@ -138,11 +138,9 @@ fn frames_are_the_cpus() {
             assert!((500_000..2_000_000).contains(&bytes), "{bytes} bytes of probes");
         }
     }
-    for (name, options) in [
-        ("rays", "--method lightmap-rt --samples 8 --supersample 2"),
-        ("events", "--method lightmap-rt --max-depth 2 --set next_event=true"),
-        ("mirrors", "--method image-space-gather --supersample 2"),
-    ] {
+    for (name, options) in
+        [("rays", "--method lightmap-rt --samples 8 --supersample 2"), ("mirrors", "--method image-space-gather --supersample 2")]
+    {
         let (frames, timings) = baked.both(name, options);
         for images in &frames {
             for layer in ["emission", "diffuse", "glossy", ""] {
