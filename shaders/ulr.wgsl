@@ -23,7 +23,7 @@ const MAX_SPREAD: f32 = 0.2;
 
 @group(0) @binding(0) var<storage, read> ulr: UlrParams;
 // Struct: probe::file::Texel, in words.
-@group(0) @binding(3) var<storage, read> texels: array<array<u32, 6>>;
+@group(0) @binding(3) var<storage, read> texels: array<array<u32, 7>>;
 // The planes of the view.
 @group(0) @binding(4) var<storage, read> view_hits: array<Hit>;
 @group(0) @binding(5) var<storage, read> view_positions: array<vec4<f32>>;
@@ -71,10 +71,10 @@ fn look(p: vec3<f32>, f: Facet) -> Look {
         let texel = texels[texel_index(i32(low.x) + (k & 1), i32(low.y) + (k >> 1u))];
         // Halves that are no zero, of either sign.
         let is_lit = ((texel[0] | (texel[1] << 16u)) & 0x7fff7fffu) != 0u;
-        if texel[5] == NO_TRIANGLE || !is_lit {
+        if texel[6] == NO_TRIANGLE || !is_lit {
             continue;
         }
-        let there = facet(texel[5]);
+        let there = facet(texel[6]);
         if there.object != f.object {
             continue;
         }

@@ -204,10 +204,10 @@ mod tests {
         check!(&source(), Params as "UlrParams" {
             eye, width, height, blend, angle, resolution, hidden, plane_tolerance
         });
-        assert_eq!(size_of::<Texel>(), 6 * 4);
+        assert_eq!(size_of::<Texel>(), 7 * 4);
         assert_eq!(
             [offset_of!(Texel, glossy), offset_of!(Texel, barycentric), offset_of!(Texel, triangle)],
-            [0, 3 * 4 + 2, 5 * 4]
+            [0, 3 * 4 + 2, 6 * 4]
         );
     }
 }
