@@ -13,6 +13,8 @@ struct ImageSpaceGatherParams {
     max_sigma: f32,
     min_normal_cos: f32,
     plane_sigma: f32,
+    padding0: u32,
+    padding1: u32,
 }
 
 // Twins: image_space_gather::{LOBE_SIGMA, REACH}.

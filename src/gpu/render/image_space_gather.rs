@@ -32,6 +32,7 @@ struct Params {
     max_sigma: f32,
     min_normal_cos: f32,
     plane_sigma: f32,
+    padding: [u32; 2],
 }
 
 fn source() -> String {
@@ -94,6 +95,7 @@ impl ImageSpaceGather {
                     max_sigma: params.max_sigma(),
                     min_normal_cos: params.min_normal_cos,
                     plane_sigma: params.plane_sigma,
+                    padding: [0; 2],
                 };
                 gpu.upload("the gather's parameters", bytemuck::bytes_of(&params))
             };
