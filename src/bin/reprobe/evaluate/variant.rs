@@ -121,14 +121,9 @@ pub fn paper(probes: u32) -> Result<Vec<Variant>, String> {
     let double = format!("place-probes:--count={}", 2 * probes);
     let unfiltered = "footprint=null,gather.anchors=1,bake-probes:--roughness-scale=0.5";
     let list = [
-        ("unfiltered", "Fig. 15", "no filter, half roughness", WHOLE, unfiltered.to_owned()),
-        (
-            "full-roughness",
-            "Fig. 15",
-            "probes of full roughness, no filter",
-            WHOLE,
-            "footprint=null,bake-probes:--roughness-scale=1".into(),
-        ),
+        ("half-roughness", "Fig. 15", "probes of half roughness", WHOLE, "bake-probes:--roughness-scale=0.5".into()),
+        ("unfiltered", "Fig. 15", "no filter, half roughness", "half-roughness", unfiltered.to_owned()),
+        ("full-roughness", "Fig. 15", "no filter, full roughness", WHOLE, "footprint=null".into()),
         ("lat-long", "Fig. 12", "lat-long probes", WHOLE, "qhmap:--lat-long".into()),
         ("one-probe-unfiltered", "Fig. 12", "one probe, no filter", "unfiltered", format!("{unfiltered},gather.probes=1")),
         (
