@@ -162,7 +162,8 @@ fn wrong_requests_are_refused_before_anything_is_baked() {
     assert!(!f.at("out").exists());
     let dry = |args: &str| String::from_utf8_lossy(&f.evaluate(&format!("{args} --dry-run")).stdout).into_owned();
     let text = dry("--ablations paper");
-    for part in ["--lat-long", "--roughness-scale 1", "--count 6 ", "--count 24 ", "--alternative", "--seed 1", "footprint=null"]
+    for part in
+        ["--lat-long", "--roughness-scale 0.5", "--count 6 ", "--count 24 ", "--alternative", "--seed 1", "footprint=null"]
     {
         assert!(text.contains(part), "{part}: {text}");
     }
