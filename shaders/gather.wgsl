@@ -16,6 +16,10 @@ struct Params {
     material_penalty: f32,
     falloff: f32,
     albedo_ratio: u32,
+    roughness_penalty: f32,
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
     // Radius and step of each level.
     search: array<vec2<f32>, 8>,
 }
@@ -31,6 +35,7 @@ struct Seen {
 struct Directions {
     normal: array<f32, 3>,
     reflected: array<f32, 3>,
+    alpha: f32,
 }
 
 // Struct: render::candidates::Light.
@@ -65,6 +70,7 @@ struct Target {
     direction: vec3<f32>,
     reflected: Reflected,
     material: u32,
+    alpha: f32,
 }
 
 const NEAREST: u32 = 0u;
@@ -123,7 +129,9 @@ fn energy_below(limit: f32, i: u32, wanted: Target) -> f32 {
     let d = directions[i];
     let s_c = 1.0 - dot(wanted.normal, vec3(d.normal[0], d.normal[1], d.normal[2]));
     let s_d = 1.0 - dot(wanted.direction, vec3(d.reflected[0], d.reflected[1], d.reflected[2]));
-    let energy = s_a * (s_b + clamp(s_c, 0.0, 1.0) + clamp(s_d, 0.0, 1.0));
+    let both = wanted.alpha + d.alpha;
+    let s_e = select(0.0, params.roughness_penalty * abs(wanted.alpha - d.alpha) / both, both > 0.0);
+    let energy = s_a * (s_b + clamp(s_c, 0.0, 1.0) + clamp(s_d, 0.0, 1.0) + s_e);
     return select(FAR, energy, energy < limit);
 }
 
@@ -194,7 +202,7 @@ fn between_anchors(pixel: vec2<u32>, centre: vec2<f32>, wanted: Target) -> Sampl
 
 fn wanted_at(i: u32) -> Target {
     let r = reflected[i];
-    return Target(normals[i].xyz, direction_from(r, positions[i].xyz), r, materials[i]);
+    return Target(normals[i].xyz, direction_from(r, positions[i].xyz), r, materials[i], positions[i].w);
 }
 
 // The texel coordinate at which the probe should see what pixel i reflects.

@@ -13,7 +13,7 @@ use reprobe::render::candidates::Candidates;
 use reprobe::render::composite::downsample;
 use reprobe::render::coverage::{CoverageParams, SubPixels, covered_pixels};
 use reprobe::render::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
-use reprobe::render::gbuffer::{GBuffer, gbuffer};
+use reprobe::render::gbuffer::{GBuffer, Pixel, gbuffer};
 use reprobe::render::mirror::{Reflected, mirror_hit, mirror_pass};
 use reprobe::render::mirror_light::{add_mirrored, mirror_light_pass};
 use reprobe::render::perturb::Order;
@@ -273,6 +273,31 @@ fn what_perfect_mirrors_show_of_lamps_needs_no_texels() {
     let (plain, lit) = (wrong(&gathered(false)), wrong(&add_mirrored(&gathered(true), &shown)));
     assert!(plain.1 > 500 && plain.0 > 500, "{plain:?}: nothing to be cured");
     assert_eq!(lit.0, 0, "of {}", lit.1);
+}
+
+#[test]
+fn samples_are_of_the_pixels_roughness_where_that_varies() {
+    let plate = r#"<shape type="rectangle"><transform name="to_world"><scale value="1.5"/><translate value="0,0,0.1"/></transform>
+        <bsdf type="roughconductor"><string name="material" value="none"/><texture type="checkerboard" name="alpha">
+          <rgb name="color0" value="0.05"/><rgb name="color1" value="0.25"/><transform name="to_uv"><scale value="4"/></transform>
+        </texture></bsdf></shape>"#;
+    let setup = Setup::new(room(plate), Vec3::new(0.2, 0.1, 2.0), 0.6, 128);
+    let (view, reflected) = setup.view(Vec3::new(0.3, 0.05, 2.1), Vec3::ZERO);
+    let candidates: Vec<_> = setup.probes.iter().map(|p| Candidates::new(&setup.world, p, None, false)).collect();
+    let of_another = |roughness_penalty: f32| {
+        let params = GatherParams { roughness_penalty, ..GatherParams::default() };
+        let gathered = setup.gather(&view, &reflected, &params);
+        let differs = |(pixel, g): (&Option<Pixel>, &Gathered)| {
+            let (alpha, (probe, texel)) = (pixel.as_ref()?.alpha?, g.best?);
+            let there = candidates[probe].directions[setup.probes[probe].index_at(texel)].alpha;
+            Some((there - alpha).abs() > 0.1)
+        };
+        let all: Vec<bool> = view.pixels.iter().zip(&gathered).filter_map(differs).collect();
+        assert!(all.len() > 1000, "{}", all.len());
+        all.iter().filter(|&&d| d).count() as f64 / all.len() as f64
+    };
+    let (without, with) = (of_another(0.0), of_another(1.0));
+    assert!(without > 0.2 && with < 0.2 * without, "{without} of the samples are of another roughness, {with} with the penalty");
 }
 
 #[test]

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// [`Seen::material`] of a texel that sees no surface.
 const NO_SURFACE: u16 = u16::MAX;
 
-/// A probe's texels as the gather sees them, an entry a texel in each list. 72 bytes a texel in all, the same on a GPU.
+/// A probe's texels as the gather sees them, an entry a texel in each list. 76 bytes a texel in all, the same on a GPU.
 #[derive(Default)]
 pub struct Candidates {
     /// What rules most texels out.
@@ -43,7 +43,7 @@ impl Seen {
     }
 }
 
-/// The reflector's normal, and the direction from it to what it reflects.
+/// The reflector's normal and roughness, and the direction from it to what it reflects.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct Directions {
@@ -51,6 +51,8 @@ pub struct Directions {
     pub normal: Vec3,
     /// Unit direction of the reflected ray.
     pub reflected: Vec3,
+    /// Microfacet alpha of the reflector's non-diffuse lobe, unscaled; 0 where it has none.
+    pub alpha: f32,
 }
 
 /// Colour, and what decides whether it may be blended.
@@ -73,7 +75,7 @@ impl Candidates {
     pub fn new(world: &World, probe: &Probe, roughness_scale: Option<f32>, mirror_light: bool) -> Self {
         let width = probe.size[0] as usize;
         let rows = || probe.texels.par_iter().with_min_len(width);
-        let reflectors: Vec<_> = rows().map(|texel| reflector(world, texel, probe.position)).collect();
+        let reflectors: Vec<_> = rows().map(|texel| reflector(world, texel, probe.position, roughness_scale)).collect();
         let with_reflectors = || rows().zip(&reflectors);
         let material = |object: u32| world.scene.geometry.objects[object as usize].material as u16;
         let seen = |(texel, r): (&Texel, &Option<Reflector>)| {
@@ -81,18 +83,14 @@ impl Candidates {
             Seen { reflected_point, reflected_material, material: r.as_ref().map_or(NO_SURFACE, |r| material(r.object)) }
         };
         let directions = |(texel, r): (&Texel, &Option<Reflector>)| match r {
-            Some(r) => Directions { normal: r.normal, reflected: texel.reflected().direction_from(r.position) },
-            None => Directions { normal: Vec3::ZERO, reflected: Vec3::ZERO },
+            Some(r) => Directions { normal: r.normal, reflected: texel.reflected().direction_from(r.position), alpha: r.alpha },
+            None => Directions { normal: Vec3::ZERO, reflected: Vec3::ZERO, alpha: 0.0 },
         };
-        let light = |(texel, r): (&Texel, &Option<Reflector>)| {
-            let albedo =
-                if r.is_some() { roughness_scale.map(|scale| albedo(world, texel, probe.position, scale)) } else { None };
-            Light {
-                glossy: if mirror_light { texel.glossy() - texel.mirrored() } else { texel.glossy() },
-                albedo: albedo.unwrap_or(Rgb::ONE),
-                reflected_material: u32::from(texel.reflected_material),
-                object: r.as_ref().map_or(u32::MAX, |r| r.object),
-            }
+        let light = |(texel, r): (&Texel, &Option<Reflector>)| Light {
+            glossy: if mirror_light { texel.glossy() - texel.mirrored() } else { texel.glossy() },
+            albedo: r.as_ref().map_or(Rgb::ONE, |r| r.albedo),
+            reflected_material: u32::from(texel.reflected_material),
+            object: r.as_ref().map_or(u32::MAX, |r| r.object),
         };
         Self {
             seen: with_reflectors().map(seen).collect(),
@@ -107,9 +105,11 @@ struct Reflector {
     position: Vec3,
     normal: Vec3,
     object: u32,
+    alpha: f32,
+    albedo: Rgb,
 }
 
-fn reflector(world: &World, texel: &Texel, eye: Vec3) -> Option<Reflector> {
+fn reflector(world: &World, texel: &Texel, eye: Vec3, roughness_scale: Option<f32>) -> Option<Reflector> {
     if texel.triangle == NO_TRIANGLE {
         return None;
     }
@@ -124,16 +124,19 @@ fn reflector(world: &World, texel: &Texel, eye: Vec3) -> Option<Reflector> {
     let n = n.try_normalize().unwrap_or(Vec3::Y);
     let eye_side = ng.dot(eye - position) * ng.dot(n);
     let object = geometry.triangle_object[texel.triangle as usize];
-    Some(Reflector { position, normal: if eye_side < 0.0 { -n } else { n }, object })
+    let (alpha, albedo) = lobe(world, texel, eye, roughness_scale);
+    Some(Reflector { position, normal: if eye_side < 0.0 { -n } else { n }, object, alpha, albedo })
 }
 
-/// Directional albedo of a texel's non-diffuse lobe towards the probe.
-fn albedo(world: &World, texel: &Texel, eye: Vec3, roughness_scale: f32) -> Rgb {
+/// Alpha of a texel's non-diffuse lobe, and its directional albedo towards the probe; 1 where nobody asks.
+fn lobe(world: &World, texel: &Texel, eye: Vec3, roughness_scale: Option<f32>) -> (f32, Rgb) {
     let b = texel.barycentric();
     let surface = world.surface(&Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
+    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
     let wo = (eye - surface.p).try_normalize().unwrap_or(surface.frame.n);
-    let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
-    world.scene.materials[surface.material as usize].bsdf.glossy_albedo(&surface, surface.frame.to_local(wo), query)
+    let query = |roughness_scale| Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
+    let albedo = roughness_scale.map(|scale| bsdf.glossy_albedo(&surface, surface.frame.to_local(wo), query(scale)));
+    (bsdf.alpha(&surface).unwrap_or(0.0), albedo.unwrap_or(Rgb::ONE))
 }
 
 /// The candidates of the probes around the camera, for as long as they are around it: quickly made, and more memory than the probe.

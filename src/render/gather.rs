@@ -55,6 +55,10 @@ pub struct GatherParams {
     pub anchors: usize,
     /// s_a, the factor on the energy where the reflected materials differ. *Paper*: 10.
     pub material_penalty: f32,
+    /// s_e, the factor on how much the reflectors' roughness differs, |α - α'| / (α + α'), which is added to the energy (Eq. 1). *Paper*: 0;
+    /// its §8 names the term. *Ours*: 1.
+    #[serde(default)]
+    pub roughness_penalty: f32,
     /// φ, the falloff of a sample's weight with its energy (Eq. 2). *Paper*: 8. *Ours*: 128.
     pub falloff: f32,
     /// The power of t_i that counts as a probe's weight: below 1, the nearest probe outweighs the others less, and all still come
@@ -92,6 +96,7 @@ impl Default for GatherParams {
             trilinear_power: 0.5,
             bilinear: BilinearRule::SameReflectorAndReflected,
             albedo_ratio: true,
+            roughness_penalty: 1.0,
             perturb: PerturbParams::default(),
             ..paper
         }
@@ -105,6 +110,7 @@ impl GatherParams {
             search: vec![SearchLevel { radius: 3, step: 4.0 }, SearchLevel { radius: 1, step: 2.0 }],
             anchors: 1,
             material_penalty: 10.0,
+            roughness_penalty: 0.0,
             falloff: 8.0,
             trilinear_power: 1.0,
             probes: 8,
@@ -231,7 +237,8 @@ pub fn best_samples(
             let direction = reflected.direction_from(r);
             let distance = reflected.distance_from(r);
             let path = Perturbation::new(eye, r, n, distance, &pixel.curvature, &params.perturb);
-            (Target { normal: n, direction, reflected, material: pixel.surface.material }, path)
+            let alpha = pixel.alpha.unwrap_or(0.0);
+            (Target { normal: n, direction, reflected, material: pixel.surface.material, alpha }, path)
         })
         .collect();
     let step = params.anchors.max(1);
@@ -273,6 +280,8 @@ struct Target {
     reflected: Reflected,
     /// Material of the reflector.
     material: u32,
+    /// Its microfacet alpha.
+    alpha: f32,
 }
 
 /// The sample that the ends of the anchors `around` lead to; `None` where it is much worse than theirs, or there is none.
@@ -338,7 +347,7 @@ impl WeightedProbe<'_> {
     }
 
     /// E of Eq. 1, how badly a texel stands in for the target, where it is below `limit` and the reflectors are of one material.
-    /// Zero is a perfect match; at most 3 s_a.
+    /// Zero is a perfect match; at most (3 + s_e) s_a.
     #[inline]
     fn energy_below(&self, limit: f32, texel: usize, target: &Target, params: &GatherParams) -> Option<f32> {
         let seen = &self.candidates.seen[texel];
@@ -352,7 +361,9 @@ impl WeightedProbe<'_> {
         let directions = &self.candidates.directions[texel];
         let s_c = 1.0 - target.normal.dot(directions.normal);
         let s_d = 1.0 - target.direction.dot(directions.reflected);
-        let energy = s_a * (s_b + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0));
+        let both = target.alpha + directions.alpha;
+        let s_e = if both > 0.0 { params.roughness_penalty * (target.alpha - directions.alpha).abs() / both } else { 0.0 };
+        let energy = s_a * (s_b + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0) + s_e);
         (energy < limit).then_some(energy)
     }
 }

@@ -55,6 +55,8 @@ struct Params {
     material_penalty: f32,
     falloff: f32,
     albedo_ratio: u32,
+    roughness_penalty: f32,
+    padding: [u32; 3],
     search: [[f32; 2]; LEVELS],
 }
 
@@ -77,6 +79,8 @@ impl Params {
                 BilinearRule::SameReflectorAndReflected => 2,
             },
             material_penalty: params.material_penalty,
+            roughness_penalty: params.roughness_penalty,
+            padding: [0; 3],
             falloff: params.falloff,
             albedo_ratio: params.albedo_ratio.into(),
             search,
@@ -187,7 +191,8 @@ mod tests {
         let source = shader!("math", "perturb", "view", "probe", "gather");
         check!(source, Perturb as "PerturbParams" { order, exact_plane, second_order_limit, min_focus, newton });
         check!(source, Params as "Params" {
-            eye, width, perturb, height, anchors, levels, bilinear, material_penalty, falloff, albedo_ratio, search
+            eye, width, perturb, height, anchors, levels, bilinear, material_penalty, falloff, albedo_ratio,
+            roughness_penalty, search
         });
     }
 }

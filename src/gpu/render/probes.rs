@@ -136,6 +136,6 @@ mod tests {
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {
         check!(shader!("math", "probe"), Place as "Probe" { position, weight, size, mesh, index });
-        assert_eq!(TEXEL, 72);
+        assert_eq!(TEXEL, 76);
     }
 }
