@@ -36,7 +36,7 @@ fn main() {
     let mut store = ProbeStore::open(Path::new(probes), &world.scene, usize::MAX).expect("probes of this scene");
     let near: Vec<_> = nearest_probes(&store.set.grid, camera.position(), 8)
         .into_iter()
-        .map(|(i, weight)| (i, store.probe(i).expect("a probe"), weight))
+        .map(|(i, t)| (i, store.probe(i).expect("a probe"), GatherParams::default().probe_weight(t)))
         .collect();
     let near: Vec<_> = near.iter().map(|(i, probe, weight)| (*i, &**probe, *weight)).collect();
     let mut candidates = NearCandidates::default();

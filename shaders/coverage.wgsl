@@ -161,9 +161,7 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
                 break;
             }
             if bounce == 1u {
-                let f = facet(hit.triangle);
-                let point = f.corners[0] * (1.0 - hit.u - hit.v) + f.corners[1] * hit.u + f.corners[2] * hit.v;
-                mirrored = Reflected(point, f.material);
+                mirrored = reflected_at(hit);
             }
             if bounce > 0u && !is_lit_mirror {
                 break;

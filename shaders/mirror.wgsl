@@ -24,6 +24,13 @@ fn mirror_direction(s: Surface, wo: vec3<f32>) -> vec3<f32> {
     return normalize_or(d, ng);
 }
 
+// What a mirror ray meets.
+fn reflected_at(hit: Hit) -> Reflected {
+    let f = facet(hit.triangle);
+    let point = f.corners[0] * (1.0 - hit.u - hit.v) + f.corners[1] * hit.u + f.corners[2] * hit.v;
+    return Reflected(point, f.material);
+}
+
 // Traces the mirror ray of a surface for a viewer at direction `wo`.
 fn mirror_hit(s: Surface, wo: vec3<f32>) -> Reflected {
     let d = mirror_direction(s, wo);
@@ -31,9 +38,7 @@ fn mirror_hit(s: Surface, wo: vec3<f32>) -> Reflected {
     if hit.triangle == NO_TRIANGLE {
         return Reflected(d, SKY);
     }
-    let f = facet(hit.triangle);
-    let point = f.corners[0] * (1.0 - hit.u - hit.v) + f.corners[1] * hit.u + f.corners[2] * hit.v;
-    return Reflected(point, f.material);
+    return reflected_at(hit);
 }
 
 @compute @workgroup_size(8, 8)

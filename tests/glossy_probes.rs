@@ -253,7 +253,7 @@ fn what_perfect_mirrors_show_of_lamps_needs_no_texels() {
     assert!(told.iter().all(|t| (t.glossy() - t.mirrored()).length() < 1e-2));
 
     let (view, reflected) = setup.view(Vec3::new(0.3, 0.05, 2.1), Vec3::ZERO);
-    let shown = mirror_light_pass(&setup.world, &map, &view);
+    let (_, shown) = mirror_light_pass(&setup.world, &map, &view);
     let wrong = |glossy: &[Vec3]| {
         let wall = |i: &usize| view.pixels[*i].as_ref().is_some_and(|p| p.alpha == Some(0.0)) && is_wall(reflected[*i].material);
         let pixels: Vec<usize> = (0..glossy.len()).filter(wall).collect();

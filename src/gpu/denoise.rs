@@ -2,7 +2,7 @@
 
 use super::Gpu;
 use super::camera::GpuCamera;
-use super::kernel::{Kernel, shader};
+use super::kernel::{Kernel, area, groups, shader};
 use super::scene::{GpuScene, MATERIALS, RAYS};
 use crate::Result;
 use crate::math::Rgb;
@@ -128,7 +128,7 @@ impl Denoiser {
     /// The guides of a frame, as [`crate::render::baseline::denoise::guides`] has them; a dispatch for each of a pixel's rays.
     pub fn guides(&self, camera: &Camera, spp: u32, seed: u32, frame: u32) -> Result<GpuGuides> {
         let gpu = &self.scene.gpu;
-        let bytes = u64::from(camera.size[0]) * u64::from(camera.size[1]) * size_of::<GpuGuide>() as u64;
+        let bytes = area(camera.size) * size_of::<GpuGuide>() as u64;
         let guides = GpuGuides {
             size: camera.size,
             layers: [gpu.output("the diffuse layer's guides", bytes)?, gpu.output("the glossy layer's guides", bytes)?],
@@ -194,10 +194,6 @@ impl Denoiser {
         let DenoiseParams { luminance_sigma, normal_power, depth_sigma, albedo_sigma, despeckle, .. } = self.params;
         Params { width, height, step, despeckle, luminance_sigma, normal_power, depth_sigma, albedo_sigma }
     }
-}
-
-fn groups(size: [u32; 2], group: [u32; 2]) -> [u32; 2] {
-    [size[0].div_ceil(group[0]), size[1].div_ceil(group[1])]
 }
 
 #[cfg(test)]

@@ -5,6 +5,16 @@ use super::scene::{GpuScene, layout};
 use crate::{Error, Result};
 use bytemuck::Pod;
 
+/// Pixels of a picture.
+pub(super) fn area([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// Workgroups that cover a picture.
+pub(super) fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
+    [size[0].div_ceil(workgroup[0]), size[1].div_ceil(workgroup[1])]
+}
+
 /// A compiled entry point. Its bindings are buffers of group 0, numbered from 0; group 1 is the scene, for kernels that follow its light.
 #[derive(Clone)]
 pub(super) struct Kernel {

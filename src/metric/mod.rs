@@ -75,15 +75,17 @@ pub fn display(image: &Raster, exposure: f32) -> Raster {
     Raster { size: image.size, pixels: image.pixels.iter().map(|&p| (p * scale).map(encode)).collect() }
 }
 
+/// The channels of an image, and its luminance.
+fn planes(r: &Raster) -> [Vec<f32>; 4] {
+    let channel = |i: usize| r.pixels.iter().map(|p| p[i]).collect();
+    [channel(0), channel(1), channel(2), r.pixels.iter().map(|&p| crate::math::luminance(p)).collect()]
+}
+
 /// All metrics of `image` against `reference`, at 2^`exposure`. Both hold linear radiance, are of one size, and at least
 /// [`ssim::WINDOW`] pixels a side.
 pub fn compare(image: &Raster, reference: &Raster, exposure: f32) -> Comparison {
     assert_eq!(image.size, reference.size, "compare takes images of one size");
     let [a, b] = [display(image, exposure), display(reference, exposure)];
-    let planes = |r: &Raster| -> [Vec<f32>; 4] {
-        let channel = |i: usize| r.pixels.iter().map(|p| p[i]).collect();
-        [channel(0), channel(1), channel(2), r.pixels.iter().map(|&p| crate::math::luminance(p)).collect()]
-    };
     let (pa, pb) = (planes(&a), planes(&b));
     let similar: Vec<ssim::Ssim> = pa.par_iter().zip(&pb).map(|(x, y)| ssim::ssim(x, y, a.size)).collect();
     let dssim = |s: f64| (1.0 - s) / 2.0;

@@ -26,12 +26,8 @@ pub fn ssim(a: &[f32], b: &[f32], size: [usize; 2]) -> Ssim {
     let blur = |of: &dyn Fn(f64, f64) -> f64| blur_of(a, b, size, of);
     let (ua, ub) = (blur(&|x, _| x), blur(&|_, y| y));
     let (uaa, ubb, uab) = (blur(&|x, _| x * x), blur(&|_, y| y * y), blur(&|x, y| x * y));
-    let similarity = |i: usize| {
-        let (va, vb, vab) = (uaa[i] - ua[i] * ua[i], ubb[i] - ub[i] * ub[i], uab[i] - ua[i] * ub[i]);
-        let structure = (2.0 * vab + C2) / (va + vb + C2);
-        structure * (2.0 * ua[i] * ub[i] + C1) / (ua[i] * ua[i] + ub[i] * ub[i] + C1)
-    };
-    let map: Vec<f64> = (0..a.len()).map(similarity).collect();
+    let at = |i: usize| similarity([ua[i], uaa[i]], [ub[i], ub[i]], [uab[i], uab[i]], ubb[i]);
+    let map: Vec<f64> = (0..a.len()).map(at).collect();
     Ssim { mean: mean_inside(&map, size), map: map.iter().map(|&x| x as f32).collect() }
 }
 
@@ -42,14 +38,16 @@ pub fn ssim_to_pair(a: &[f32], [b, c]: [&[f32]; 2], size: [usize; 2]) -> f64 {
     let product = |x: &[f32], y: &[f32]| blur_of(x, y, size, &|x, y| x * y);
     let [ua, ub, uc] = [a, b, c].map(|plane| blur_of(plane, plane, size, &|x, _| x));
     let (uaa, uab, uac, ubc) = (product(a, a), product(a, b), product(a, c), product(b, c));
-    let similarity = |i: usize| {
-        let (va, vbc) = (uaa[i] - ua[i] * ua[i], (ubc[i] - ub[i] * uc[i]).max(-0.5 * C2));
-        let (vab, vac) = (uab[i] - ua[i] * ub[i], uac[i] - ua[i] * uc[i]);
-        let structure = (vab + vac + C2) / (va + vbc + C2);
-        structure * (ua[i] * (ub[i] + uc[i]) + C1) / (ua[i] * ua[i] + ub[i] * uc[i] + C1)
-    };
-    let map: Vec<f64> = (0..a.len()).map(similarity).collect();
+    let at = |i: usize| similarity([ua[i], uaa[i]], [ub[i], uc[i]], [uab[i], uac[i]], ubc[i]);
+    let map: Vec<f64> = (0..a.len()).map(at).collect();
     mean_inside(&map, size)
+}
+
+/// SSIM by the means under one window: of a and its square, of b and c, of their products with a, and of b times c.
+fn similarity([ua, uaa]: [f64; 2], [ub, uc]: [f64; 2], [uab, uac]: [f64; 2], ubc: f64) -> f64 {
+    let (va, vbc) = (uaa - ua * ua, (ubc - ub * uc).max(-0.5 * C2));
+    let structure = ((uab - ua * ub) + (uac - ua * uc) + C2) / (va + vbc + C2);
+    structure * (ua * (ub + uc) + C1) / (ua * ua + ub * uc + C1)
 }
 
 /// A function of two planes, pixel by pixel, under the window.

@@ -6,7 +6,7 @@
 //! expects the variance of r. All this is of display values, whose curve makes of unbiased radiance something slightly biased; that
 //! is of second order in the noise.
 
-use super::{Raster, display, rmse, ssim};
+use super::{Raster, display, planes, rmse, ssim};
 use crate::math::{Rgb, luminance};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,12 +35,9 @@ pub fn without_noise(image: &Raster, references: [&Raster; 2], exposure: f32) ->
         let differences = a.pixels.iter().zip(&b.pixels).zip(&c.pixels).map(|((&a, &b), &c)| of(a - b, a - c));
         (differences.sum::<f64>() / a.pixels.len() as f64).max(0.0).sqrt()
     };
-    let plane =
-        |r: &Raster, i: usize| -> Vec<f32> { r.pixels.iter().map(|&p| if i < 3 { p[i] } else { luminance(p) }).collect() };
-    let dssim: Vec<f64> = (0..4)
-        .into_par_iter()
-        .map(|i| (1.0 - ssim::ssim_to_pair(&plane(&a, i), [&plane(&b, i), &plane(&c, i)], a.size)) / 2.0)
-        .collect();
+    let [pa, pb, pc] = [&a, &b, &c].map(planes);
+    let dssim: Vec<f64> =
+        (0..4).into_par_iter().map(|i| (1.0 - ssim::ssim_to_pair(&pa[i], [&pb[i], &pc[i]], a.size)) / 2.0).collect();
     WithoutNoise {
         rmse_rgb: product(|x, y| f64::from(x.dot(y)) / 3.0),
         rmse_lum: product(|x, y| f64::from(luminance(x)) * f64::from(luminance(y))),

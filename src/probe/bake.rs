@@ -157,11 +157,11 @@ pub fn bake_glossy(
         }
     };
     let mut traced = Traced::default();
-    for (centre, sums) in centres.iter().zip(sums) {
-        let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
+    let mirrored: Vec<Option<Rgb>> = centres.par_iter().map(|centre| mirrored(bake, probe, centre)).collect();
+    for ((centre, sums), mirrored) in centres.iter().zip(sums).zip(mirrored) {
         let texel = &mut probe.texels[centre.texel as usize];
         texel.set_glossy(sums.color / sums.paths as f32);
-        texel.set_mirrored(mirrored(bake, centre, wo).unwrap_or(Rgb::ZERO));
+        texel.set_mirrored(mirrored.unwrap_or(Rgb::ZERO));
         traced.texels += 1;
         traced.paths += u64::from(sums.paths);
     }
@@ -176,8 +176,9 @@ impl Bake<'_> {
 }
 
 /// What a texel's perfect mirror shows of the light map's light.
-fn mirrored(bake: &Bake, centre: &Centre, wo: Vec3) -> Option<Rgb> {
+fn mirrored(bake: &Bake, probe: &Probe, centre: &Centre) -> Option<Rgb> {
     let map = bake.lightmap.filter(|_| bake.tells_mirrored())?;
+    let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
     let surface = bake.world.surface(&centre.hit);
     let alpha = bake.world.scene.materials[surface.material as usize].bsdf.alpha(&surface)?;
     (alpha == 0.0).then(|| mirror_light(bake.world, map, &surface, wo).1)

@@ -121,7 +121,7 @@ impl GatherParams {
     }
 
     /// A probe's weight at equal energy, for its trilinear weight t_i.
-    pub(crate) fn probe_weight(&self, t: f32) -> f32 {
+    pub fn probe_weight(&self, t: f32) -> f32 {
         t.powf(self.trilinear_power).max(MIN_WEIGHT)
     }
 }
@@ -154,7 +154,7 @@ impl Gathered {
     pub const NONE: Self = Self { color: Rgb::ZERO, energy: f32::INFINITY, best: None };
 }
 
-/// A probe that takes part, with its trilinear weight t_i.
+/// A probe that takes part.
 pub struct WeightedProbe<'a> {
     /// Index in the set.
     pub index: usize,
@@ -162,7 +162,7 @@ pub struct WeightedProbe<'a> {
     pub probe: &'a Probe,
     /// Its texels, ready for the search.
     pub candidates: &'a Candidates,
-    /// t_i.
+    /// Its weight at equal energy ([`GatherParams::probe_weight`]).
     pub weight: f32,
 }
 
@@ -323,7 +323,7 @@ fn blend(
     let (mut sum, mut z) = (Rgb::ZERO, 0.0);
     let albedo = params.albedo_ratio.then(|| view_albedo(world, pixel, roughness_scale));
     for (w, sample) in found() {
-        let weight = params.probe_weight(w.weight) * (-params.falloff * (sample.energy - best.energy)).exp();
+        let weight = w.weight * (-params.falloff * (sample.energy - best.energy)).exp();
         let mut color = fetch(w, sample.texel, params.bilinear);
         if let Some(view) = albedo {
             color *= albedo_ratio(view, w, sample.texel);

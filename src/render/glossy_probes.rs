@@ -147,7 +147,7 @@ impl<'a> Renderer<'a> {
 
         let near: Vec<_> = nearest_probes(&probes.set.grid, camera.position(), self.params.gather.probes)
             .into_iter()
-            .map(|(index, weight)| Ok((index, probes.probe(index)?, weight)))
+            .map(|(index, t)| Ok((index, probes.probe(index)?, self.params.gather.probe_weight(t))))
             .collect::<Result<_>>()?;
         let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
         let roughness_scale = probes.set.roughness_scale;
@@ -157,7 +157,13 @@ impl<'a> Renderer<'a> {
         clock.lap("load");
         let view = Arc::new(gbuffer(self.world, self.curvature, &fine));
         clock.lap("gbuffer");
-        let reflected = mirror_pass(self.world, &view);
+        let (reflected, mirrored) = match mirrors {
+            Some(map) => {
+                let (reflected, mirrored) = mirror_light_pass(self.world, map, &view);
+                (reflected, Some(mirrored))
+            }
+            None => (mirror_pass(self.world, &view), None),
+        };
         clock.lap("mirror");
         let mut gathered = gather(self.world, &view, &reflected, &weighted, roughness_scale, &self.params.gather);
         let unserved = reproject_previous(&view, &mut gathered, self.previous.as_ref());
@@ -169,8 +175,6 @@ impl<'a> Renderer<'a> {
         clock.lap("footprint");
         let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter);
         clock.lap("filter");
-        let mirrored = mirrors.map(|map| mirror_light_pass(self.world, map, &view));
-        clock.lap("mirror");
         let diffuse = match self.lightmap {
             Some(map) => diffuse_layer(&self.world.scene, &view, map),
             None => vec![Rgb::ZERO; glossy.len()],

@@ -7,7 +7,7 @@
 
 use super::baseline::GLOSSY;
 use super::gbuffer::{GBuffer, is_glossy};
-use super::mirror::{Reflected, SKY, mirror_direction};
+use super::mirror::{Reflected, SKY, mirror_direction, mirror_hit};
 use crate::lightmap::LightMap;
 use crate::math::Rgb;
 use crate::transport::{Surface, World};
@@ -73,15 +73,16 @@ pub fn mirror_light(world: &World, lightmap: &LightMap, surface: &Surface, wo: V
     (reflected, shown.light * glossy_albedo(world, surface, wo))
 }
 
-/// What a view's perfect mirrors show; black at other pixels.
-pub fn mirror_light_pass(world: &World, lightmap: &LightMap, view: &GBuffer) -> Vec<Rgb> {
+/// [`super::mirror::mirror_pass`], and what the view's perfect mirrors show, by the same rays; black at other pixels.
+pub fn mirror_light_pass(world: &World, lightmap: &LightMap, view: &GBuffer) -> (Vec<Reflected>, Vec<Rgb>) {
     let pixels = view.pixels.par_iter().with_min_len(view.size()[0]);
     pixels
         .map(|pixel| match pixel {
-            Some(p) if p.alpha == Some(0.0) => mirror_light(world, lightmap, &p.surface, p.wo).1,
-            _ => Rgb::ZERO,
+            Some(p) if p.alpha == Some(0.0) => mirror_light(world, lightmap, &p.surface, p.wo),
+            Some(p) if p.alpha.is_some() => (mirror_hit(world, &p.surface, p.wo), Rgb::ZERO),
+            _ => (Reflected::NONE, Rgb::ZERO),
         })
-        .collect()
+        .unzip()
 }
 
 /// Both parts of a view's glossy layer together. What the probes are left with may be below zero by rounding or noise; the sum is not.

@@ -164,14 +164,7 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let todo: Vec<usize> = mine.filter(|&i| !finished(i)).collect();
     let baked = todo.len();
     let lightmap = args.lightmap.as_ref().map(|file| LightMap::load(file, scene)).transpose()?;
-    let on_gpu = |gpu| {
-        let scene = GpuScene::new(gpu, &world)?;
-        let scene = match &lightmap {
-            Some(map) => scene.with_lightmap(map)?,
-            None => scene,
-        };
-        ProbePaths::new(Arc::new(scene), &params)
-    };
+    let on_gpu = |gpu| ProbePaths::new(Arc::new(GpuScene::lit(gpu, &world, lightmap.as_ref())?), &params);
     let gpu = if todo.is_empty() { None } else { common.on_gpu(on_gpu)? };
     let shared = Bake { world: &world, params: &params, seed: common.seed, lightmap: lightmap.as_ref(), gpu: gpu.as_ref() };
     let traced = bake(args, &shared, &maps, &grid, &provenance, todo, wanted.as_ref(), &progress)?;

@@ -5,7 +5,7 @@ use crate::frames::{self, with_layers};
 use crate::render_path::{Args, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
-use crate::views::View;
+use crate::views::{View, largest};
 use anyhow::{Context, bail};
 use reprobe::gpu::{BaselineFrame, ImageSpaceGather, LightmapRt, Ulr};
 use reprobe::io::provenance::hash_file;
@@ -81,7 +81,7 @@ impl Setup {
 
 /// The image of a frame from the GPU.
 fn from_gpu(frame: &BaselineFrame, image: ExrImage, times: &mut FrameTimings) -> ExrImage {
-    times.passes_ms.extend(frame.passes.iter().map(|&(pass, ms)| (pass.into(), ms)));
+    times.passes(&frame.passes);
     with_layers(image, &frame.layers)
 }
 
@@ -102,9 +102,8 @@ pub fn run_ulr(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Re
     let mut render = |view: &View, _: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {
         if let Some(ulr) = &mut on_gpu {
             let frame = ulr.frame(&view.camera, &mut store)?;
-            times.passes_ms.extend(frame.passes.iter().map(|&(pass, ms)| (pass.into(), ms)));
-            let sub_pixels = view.camera.size.iter().map(|&s| f64::from(s * params.supersample)).product::<f64>();
-            times.unserved_fraction = Some(frame.unserved as f64 / sub_pixels);
+            times.passes(&frame.passes);
+            times.unserved(frame.unserved, view.camera.size, params.supersample);
             bar.advance(u64::from(view.camera.size[1]));
             let Frame { emission, diffuse, glossy, .. } = frame;
             return Ok(with_layers(image, &LayerImages { emission, diffuse, glossy }));
@@ -141,14 +140,9 @@ fn ulr_on_gpu(
         Ok(ulr)
     })?;
     if let Some(ulr) = &ulr {
-        timings.device = Some(ulr.device().to_owned());
-        timings.clock = if ulr.has_clock() { "gpu" } else { "cpu" }.into();
+        timings.on_gpu(ulr.device(), ulr.has_clock());
     }
     Ok(ulr)
-}
-
-fn largest(views: &[View]) -> [u32; 2] {
-    views.iter().map(|v| v.camera.size).max_by_key(|[w, h]| w * h).unwrap_or([0, 0])
 }
 
 pub fn run_image_space_gather(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
@@ -158,8 +152,7 @@ pub fn run_image_space_gather(args: &Args, common: &Common, mut timings: Timings
     let lightmap = setup.lightmap(&timings.method)?;
     let mut gpu = common.on_gpu(|gpu| ImageSpaceGather::new(gpu, &setup.world, lightmap, base.supersample))?;
     if let Some(gpu) = &gpu {
-        timings.device = Some(gpu.device().to_owned());
-        timings.clock = if gpu.has_clock() { "gpu" } else { "cpu" }.into();
+        timings.on_gpu(gpu.device(), gpu.has_clock());
     }
     let with = |samples| ImageSpaceGatherParams { samples, ..base };
     let mut render = |view: &View, samples: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {

@@ -5,6 +5,7 @@ use crate::common::Outcome;
 use crate::render_path::{Args, describe, finish, is_finished, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
+use crate::views::largest;
 use anyhow::{Context, bail};
 use reprobe::gpu;
 use reprobe::io::provenance::hash_file;
@@ -76,18 +77,16 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     let mut engine = None;
     if !kept {
         let scale = probes.set.roughness_scale;
-        let largest = cameras.iter().map(|c| c.size).max_by_key(|[w, h]| w * h).unwrap_or([0, 0]);
         let on_gpu = common.on_gpu(|gpu| {
             let memory = args.gpu_memory;
             let mut renderer = gpu::Renderer::new(gpu, &world, &curvature, lightmap.as_ref(), params.clone(), scale, memory)?;
-            renderer.reserve(largest, probes.set.size)?;
+            renderer.reserve(largest(&wanted), probes.set.size)?;
             Ok(renderer)
         })?;
         engine = Some(match on_gpu {
             Some(mut renderer) => {
                 renderer.inspect = inspect;
-                timings.device = Some(renderer.device().to_owned());
-                timings.clock = if renderer.has_clock() { "gpu" } else { "cpu" }.into();
+                timings.on_gpu(renderer.device(), renderer.has_clock());
                 Engine::Gpu(Box::new(renderer))
             }
             None => {
@@ -104,11 +103,8 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
         let mut times = FrameTimings { name, kept, ..FrameTimings::default() };
         if let Some(engine) = &mut engine {
             let frame = engine.frame(camera, cameras.get(i + 1), &mut probes)?;
-            for &(pass, ms) in &frame.passes {
-                times.passes_ms.insert(pass.into(), ms);
-            }
-            let sub_pixels = camera.size.iter().map(|&s| f64::from(s * supersample)).product::<f64>();
-            times.unserved_fraction = Some(frame.unserved as f64 / sub_pixels);
+            times.passes(&frame.passes);
+            times.unserved(frame.unserved, camera.size, supersample);
             let image = image(&frame, camera, &world, supersample);
             times.pass("write", || image.with_provenance(provenance).write(&path))?;
         }

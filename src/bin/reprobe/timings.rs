@@ -52,6 +52,12 @@ pub struct FrameTimings {
 }
 
 impl Timings {
+    /// Notes the GPU that frames are made on, and whether its own clock times their passes.
+    pub fn on_gpu(&mut self, device: &str, has_clock: bool) {
+        self.device = Some(device.to_owned());
+        self.clock = if has_clock { "gpu" } else { "cpu" }.into();
+    }
+
     /// Reads what [`Timings::finish`] led to; `None` where there is no such file.
     pub fn read(path: &Path) -> Option<Self> {
         serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()
@@ -93,6 +99,17 @@ pub fn is_rendering(pass: &str) -> bool {
 }
 
 impl FrameTimings {
+    /// Notes passes that were timed where they ran.
+    pub fn passes(&mut self, passes: &[(&'static str, f64)]) {
+        self.passes_ms.extend(passes.iter().map(|&(pass, ms)| (pass.into(), ms)));
+    }
+
+    /// Notes how many sub-pixels of a frame of `size`, so many along a pixel's side, nothing served.
+    pub fn unserved(&mut self, count: usize, size: [u32; 2], supersample: u32) {
+        let sub_pixels = size.iter().map(|&s| f64::from(s * supersample)).product::<f64>();
+        self.unserved_fraction = Some(count as f64 / sub_pixels);
+    }
+
     /// Runs a pass and notes its time.
     pub fn pass<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
         let (result, ms) = timed(work);

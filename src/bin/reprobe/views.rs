@@ -14,6 +14,11 @@ pub struct View {
     pub camera: Camera,
 }
 
+/// Size of the largest of some views, pixels.
+pub fn largest(views: &[View]) -> [u32; 2] {
+    views.iter().map(|v| v.camera.size).max_by_key(|[w, h]| w * h).unwrap_or([0, 0])
+}
+
 /// A choice of frames, like `0,3,5-8`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameList(Vec<std::ops::RangeInclusive<u32>>);

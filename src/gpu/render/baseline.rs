@@ -3,6 +3,7 @@
 use super::super::Gpu;
 use super::super::commands::Commands;
 use super::super::scene::GpuScene;
+use super::area;
 use super::composite::{Composite, Layers};
 use super::gbuffer::GBuffer;
 use super::view::View;
@@ -42,7 +43,7 @@ pub(super) struct Baseline {
 
 impl Baseline {
     pub(super) fn new(gpu: Arc<Gpu>, world: &World, lightmap: &LightMap, supersample: u32) -> Result<Self> {
-        let scene = GpuScene::new(gpu.clone(), world)?.with_lightmap(lightmap)?;
+        let scene = GpuScene::lit(gpu.clone(), world, Some(lightmap))?;
         let flat = CurvatureMap::flat(world.scene.geometry.positions.len());
         Ok(Self {
             gbuffer: GBuffer::new(&scene, world, &flat)?,
@@ -87,7 +88,7 @@ impl Baseline {
 
 impl Target {
     fn new(gpu: &Gpu, size: [u32; 2], supersample: u32) -> Result<Self> {
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let pixels = area(size);
         Ok(Self {
             view: View::new(gpu, size)?,
             glossy: gpu.output("the glossy pixels", 16 * pixels)?,

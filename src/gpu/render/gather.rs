@@ -3,6 +3,7 @@
 use super::super::Gpu;
 use super::super::commands::Commands;
 use super::super::kernel::{Kernel, shader};
+use super::area;
 use super::probes::{GpuProbe, Place};
 use super::view::View;
 use crate::render::gather::{BilinearRule, GatherParams, MAX_RADIUS, TILE};
@@ -104,12 +105,11 @@ pub(super) struct Sums {
 
 impl Sums {
     pub(super) fn new(gpu: &Gpu, size: [u32; 2], params: &GatherParams) -> Result<Self> {
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let [x, y] = anchor_grid(size, params);
+        let pixels = area(size);
         Ok(Self {
             sums: gpu.output("gathered sums", 16 * pixels)?,
             best: gpu.output("best samples", 16 * pixels)?,
-            anchors: gpu.output("anchors", ANCHOR * if anchor_step(params) > 1 { u64::from(x) * u64::from(y) } else { 1 })?,
+            anchors: gpu.output("anchors", ANCHOR * if anchor_step(params) > 1 { area(anchor_grid(size, params)) } else { 1 })?,
         })
     }
 }

@@ -7,7 +7,7 @@ use super::super::kernel::{Kernel, shader};
 use super::super::scene::{MATERIALS, PATHS, RAYS};
 use super::baseline::{Baseline, BaselineFrame, Target};
 use super::mirror_light::MirrorLight;
-use super::{FAR, WORKGROUP, bands, groups};
+use super::{FAR, WORKGROUP, area, bands, groups};
 use crate::Result;
 use crate::lightmap::LightMap;
 use crate::render::baseline::image_space_gather::{ImageSpaceGatherParams, spiral};
@@ -78,7 +78,7 @@ impl ImageSpaceGather {
         let fill = |commands: &mut Commands, camera: &Camera, target: &Target| {
             let view = &target.view;
             let size = view.size;
-            let bytes = 16 * u64::from(size[0]) * u64::from(size[1]);
+            let bytes = 16 * area(size);
             let mirrored = match mirrored.take().filter(|m| m.size() == bytes) {
                 Some(buffer) => mirrored.insert(buffer),
                 None => mirrored.insert(gpu.output("the mirror picture", bytes)?),

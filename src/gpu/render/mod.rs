@@ -25,6 +25,7 @@ pub use ulr::Ulr;
 
 use super::Gpu;
 use super::commands::Commands;
+use super::kernel::{area, groups};
 use super::scene::GpuScene;
 use crate::lightmap::LightMap;
 use crate::probe::file::Probe;
@@ -55,21 +56,12 @@ const FAR: f32 = f32::MAX;
 /// Edges of a workgroup, pixels.
 const WORKGROUP: [u32; 2] = [16, 4];
 
-/// Workgroups that cover a picture.
-fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
-    [size[0].div_ceil(workgroup[0]), size[1].div_ceil(workgroup[1])]
-}
-
 /// First row and number of rows of parts of a picture that come to `most` steps, if each of its pixels takes `steps`; whole workgroups.
 fn bands([width, height]: [u32; 2], most: u64, steps: u64) -> impl Iterator<Item = (u32, u32)> {
     const EDGE: u64 = 8;
     let rows = most / (u64::from(width) * steps.max(1)).max(1) / EDGE * EDGE;
     let rows = rows.clamp(EDGE, u64::from(height).max(EDGE)) as u32;
     (0..height).step_by(rows as usize).map(move |first| (first, rows))
-}
-
-fn area([width, height]: [u32; 2]) -> u64 {
-    u64::from(width) * u64::from(height)
 }
 
 /// What `frame` bytes for frames of `size` leave of the memory. An error where that is less than a probe's bytes.
@@ -111,7 +103,7 @@ impl Target {
     const BYTES: u64 = View::BYTES + 20 + 9 * 16;
 
     fn new(gpu: &Gpu, size: [u32; 2], params: &GlossyProbeParams) -> Result<Self> {
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let pixels = area(size);
         Ok(Self {
             view: View::new(gpu, size)?,
             last: Guides::new(gpu, pixels)?,
@@ -165,8 +157,7 @@ impl<'a> Renderer<'a> {
             let table = crate::render::footprint::Footprint::new(&f.for_probes(roughness_scale));
             Footprint::new(&gpu, &table)
         });
-        let scene = GpuScene::new(gpu.clone(), world)?;
-        let scene = if let Some(map) = lightmap { scene.with_lightmap(map)? } else { scene };
+        let scene = GpuScene::lit(gpu.clone(), world, lightmap)?;
         Ok(Self {
             inspect: false,
             world,

@@ -92,8 +92,7 @@ pub struct Ulr {
 impl Ulr {
     /// Compiles the passes. Without a light map the diffuse layer is black. `memory` is what all of it may take on the device, bytes.
     pub fn new(gpu: Arc<Gpu>, world: &World, lightmap: Option<&LightMap>, params: &UlrParams, memory: u64) -> Result<Self> {
-        let scene = GpuScene::new(gpu.clone(), world)?;
-        let scene = if let Some(map) = lightmap { scene.with_lightmap(map)? } else { scene };
+        let scene = GpuScene::lit(gpu.clone(), world, lightmap)?;
         let flat = CurvatureMap::flat(world.scene.geometry.positions.len());
         Ok(Self {
             gbuffer: GBuffer::new(&scene, world, &flat)?,

@@ -1,6 +1,7 @@
 //! A view on the device, a pixel an entry in each of its planes: the twin of [`crate::render::gbuffer::GBuffer`] and of [`Reflected`].
 
 use super::super::Gpu;
+use super::area;
 use crate::Result;
 use crate::render::mirror::Reflected;
 use bytemuck::{Pod, Zeroable};
@@ -55,7 +56,7 @@ impl View {
     pub(super) const BYTES: u64 = 8 * 16 + 4;
 
     pub(super) fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self> {
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let pixels = area(size);
         let plane = |label| gpu.output(label, 16 * pixels);
         Ok(Self {
             size,

@@ -163,6 +163,15 @@ impl GpuScene {
         Ok(Self { gpu, fixed, params, light_bytes: 0, has_masks, layout, group })
     }
 
+    /// A scene on a device, with a light map where there is one.
+    pub fn lit(gpu: Arc<Gpu>, world: &World, lightmap: Option<&LightMap>) -> Result<Self> {
+        let scene = Self::new(gpu, world)?;
+        match lightmap {
+            Some(map) => scene.with_lightmap(map),
+            None => Ok(scene),
+        }
+    }
+
     /// The same scene with a light map to look diffuse light up in.
     pub fn with_lightmap(&self, map: &LightMap) -> Result<Self> {
         let floats = |side: &[crate::math::Rgb]| side.iter().flat_map(|c| c.to_array()).collect::<Vec<f32>>();
