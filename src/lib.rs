@@ -13,17 +13,18 @@
 //! - [`metric`]: RMSE, SSIM, FLIP and the report.
 //! - [`io`]: EXR layers, atomic writes, provenance.
 
-pub mod error;
+pub mod base;
+pub mod exchange;
 pub mod gpu;
 pub mod io;
 pub mod lightmap;
-pub mod math;
+pub mod material;
+pub mod method;
 pub mod metric;
 pub mod probe;
-pub mod progress;
-pub mod render;
 pub mod scene;
 pub mod surface;
 pub mod transport;
+pub mod view;
 
-pub use error::{Error, Result};
+pub use base::error::{Error, Result};

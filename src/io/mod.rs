@@ -4,6 +4,8 @@ pub mod atomic;
 pub mod exr;
 pub mod picture;
 pub mod provenance;
+mod text;
 
 pub use exr::{ExrImage, Samples};
 pub use provenance::Provenance;
+pub use text::read_text;

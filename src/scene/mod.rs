@@ -1,34 +1,19 @@
-//! A scene as the stages see it: world-space triangles, materials, textures, emitters and the sensor.
-//!
-//! [`load`] reads Mitsuba XML (0.5 to 3) or the JSON form of the same tree.
+//! A scene as the stages see it: world-space triangles, materials, emitters and the sensor.
 
-pub mod assets;
 pub mod camera;
+pub mod camera_path;
 pub mod emitter;
 pub mod geometry;
-pub mod hash;
-pub mod image;
-pub mod ior;
-pub mod json;
-pub mod load;
-pub mod material;
-pub mod params;
-pub mod path;
-pub mod shapes;
-pub mod spectrum;
-pub mod texture;
-pub mod transform;
-pub mod tree;
-pub mod xml;
+pub mod mesh;
+pub mod normals;
+pub mod primitives;
 
+use crate::material::Material;
 use std::path::PathBuf;
 
 pub use camera::Camera;
 pub use emitter::Emitter;
 pub use geometry::{Geometry, Object};
-pub use load::load;
-pub use material::Material;
-pub use texture::Texture;
 
 /// A loaded scene. Everything is in world space and scene units times `--unit-scale`.
 #[derive(Debug, Default)]

@@ -1,9 +1,10 @@
 use super::triangle::Shear;
 use super::*;
-use crate::math::{Rgb, direction_from_lat_long};
-use crate::scene::shapes::{self, Mesh, primitives};
-use crate::scene::{Geometry, Material, Texture};
-use crate::transport::bsdf::{Bsdf, Diffuse};
+use crate::base::math::{Rgb, direction_from_lat_long};
+use crate::material::bsdf::{Bsdf, Diffuse};
+use crate::material::{Material, Texture};
+use crate::scene::mesh::{Mesh, append};
+use crate::scene::{Geometry, primitives};
 use glam::{Mat4, Vec2, Vec3};
 
 /// Uniform numbers in [0, 1) from a counter.
@@ -25,7 +26,7 @@ impl Random {
 
 fn scene_of(mesh: Mesh, m: Mat4) -> Scene {
     let mut scene = Scene::default();
-    shapes::append(&mut scene.geometry, mesh, m, false, false, String::new(), 0, None);
+    append(&mut scene.geometry, mesh, m, false, false, String::new(), 0, None);
     scene
 }
 
@@ -169,7 +170,7 @@ fn closed_meshes_do_not_leak() {
 fn masks_let_through_what_their_opacity_says() {
     let mut scene = scene_of(primitives::rectangle(), Mat4::IDENTITY);
     let back = Mat4::from_translation(Vec3::NEG_Z);
-    shapes::append(&mut scene.geometry, primitives::rectangle(), back, false, false, String::new(), 1, None);
+    append(&mut scene.geometry, primitives::rectangle(), back, false, false, String::new(), 1, None);
     let material = |opacity: Option<f32>| Material {
         name: String::new(),
         bsdf: Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::ONE) }),
@@ -239,7 +240,7 @@ fn all_forms_answer_bit_for_bit() {
     }
     let mut random = Random(5);
     let mut scene = scene_of(soup(1200, &mut random), Mat4::IDENTITY);
-    shapes::append(&mut scene.geometry, primitives::sphere(Vec3::X, 0.4), Mat4::IDENTITY, false, false, String::new(), 0, None);
+    append(&mut scene.geometry, primitives::sphere(Vec3::X, 0.4), Mat4::IDENTITY, false, false, String::new(), 0, None);
     let bvh = Bvh::build(&scene, &|_| true);
     let mut hits = 0;
     for i in 0..6000 {

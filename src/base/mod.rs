@@ -1,0 +1,7 @@
+//! What every room stands on: small geometry, rays, errors, progress, clocks.
+
+pub mod clock;
+pub mod error;
+pub mod math;
+pub mod progress;
+pub mod ray;

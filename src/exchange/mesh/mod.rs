@@ -1,0 +1,5 @@
+//! Mesh files.
+
+pub mod obj;
+pub mod ply;
+pub mod serialized;

@@ -1,0 +1,46 @@
+//! Probes on the device: those around the camera, as many as the memory that they are given holds.
+
+use crate::Result;
+use crate::gpu::Gpu;
+use crate::method::glossy_probes::candidates::{Candidates, Directions, Light, Seen};
+use crate::probe::file::Probe;
+
+/// A probe's texels and parameterisation, as the gather reads them.
+pub(crate) struct GpuProbe {
+    pub(crate) forward: wgpu::Buffer,
+    pub(crate) derivative: wgpu::Buffer,
+    pub(crate) seen: wgpu::Buffer,
+    pub(crate) directions: wgpu::Buffer,
+    pub(crate) light: wgpu::Buffer,
+}
+
+impl GpuProbe {
+    pub(crate) fn upload(gpu: &Gpu, probe: &Probe, candidates: &Candidates) -> Result<Self> {
+        Ok(Self {
+            forward: gpu.upload("a probe's map", bytemuck::cast_slice(&probe.map.forward))?,
+            derivative: gpu.upload("a probe's derivatives", bytemuck::cast_slice(&probe.map.derivative))?,
+            seen: gpu.upload("a probe's reflected hits", bytemuck::cast_slice(&candidates.seen))?,
+            directions: gpu.upload("a probe's directions", bytemuck::cast_slice(&candidates.directions))?,
+            light: gpu.upload("a probe's colours", bytemuck::cast_slice(&candidates.light))?,
+        })
+    }
+}
+
+/// Bytes a texel, but for the map.
+pub(crate) const TEXEL: u64 = (size_of::<Seen>() + size_of::<Directions>() + size_of::<Light>()) as u64;
+
+/// What a gathered probe takes on a device, bytes.
+pub(crate) fn bytes(probe: &Probe) -> u64 {
+    let map = size_of_val(probe.map.forward.as_slice()) + size_of_val(probe.map.derivative.as_slice());
+    probe.texels.len() as u64 * TEXEL + map as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_texel_takes_what_its_records_do() {
+        assert_eq!(TEXEL, 76);
+    }
+}
