@@ -3,5 +3,6 @@
 pub mod clock;
 pub mod error;
 pub mod math;
+pub mod named;
 pub mod progress;
 pub mod ray;

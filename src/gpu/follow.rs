@@ -7,34 +7,13 @@ use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::material::bsdf::{Lobes, Query};
+use crate::transport::follow::PathStart;
 use crate::transport::path::PathParams;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use std::sync::Arc;
 
 pub(crate) const WORKGROUP: usize = 64;
-
-/// `PathStart` of start.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct PathStart {
-    /// Triangle.
-    pub triangle: u32,
-    /// Barycentric weight of its second vertex.
-    pub u: f32,
-    /// Barycentric weight of its third vertex.
-    pub v: f32,
-    /// Random stream.
-    pub stream: u32,
-    /// Unit direction towards the viewer, world.
-    pub wo: [f32; 3],
-    /// Number of its first sample.
-    pub first: u32,
-    /// Number after its last one.
-    pub end: u32,
-    /// As WGSL lays it out.
-    pub padding: [u32; 3],
-}
 
 /// What paths are followed for.
 #[derive(Clone, Copy, PartialEq)]
@@ -107,13 +86,13 @@ fn source() -> String {
 
 /// Follows paths through a scene.
 #[derive(Clone)]
-pub(crate) struct Follow {
+pub(crate) struct Samples {
     scene: Arc<GpuScene>,
     kernel: Kernel,
     params: Params,
 }
 
-impl Follow {
+impl Samples {
     /// Compiles it. Where the scene has a light map, paths read diffuse light from it.
     pub fn new(scene: Arc<GpuScene>, path: &PathParams, purpose: Purpose, place: Place) -> Result<Self> {
         let source = source();
@@ -175,7 +154,7 @@ impl Follow {
     }
 
     /// Sums over all samples of every start, in dispatches of a length that `pace` has learnt. `done` hears how many more paths are done.
-    pub fn sums(&self, starts: &[PathStart], pace: &mut Pace, done: &dyn Fn(usize)) -> Result<Vec<SampleSum>> {
+    pub fn sums(&self, starts: &[PathStart], pace: &mut Pace, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<SampleSum>> {
         let mut sums = vec![SampleSum::default(); starts.len()];
         let samples = |i: &usize| starts[*i].end.saturating_sub(starts[*i].first);
         let mut todo: Vec<usize> = (0..starts.len()).collect();
@@ -201,7 +180,7 @@ impl Follow {
         [from, until]: [u32; 2],
         pace: &mut Pace,
         sums: &mut [SampleSum],
-        done: &dyn Fn(usize),
+        done: &(dyn Fn(usize) + Sync),
     ) -> Result<()> {
         let gpu = &self.scene.gpu;
         while !part.is_empty() {

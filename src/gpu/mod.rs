@@ -10,15 +10,15 @@ pub(crate) mod follow;
 pub(crate) mod kernel;
 #[cfg(test)]
 pub(crate) mod layout;
-mod light;
 pub(crate) mod pace;
+mod paths;
 mod rays;
 pub(crate) mod resident;
 pub(crate) mod scene;
 pub mod view;
 
 pub use device::{Adapter, Choice, Gpu, adapters};
-pub(crate) use follow::{PathStart, SampleSum};
-pub use light::{LightPaths, LightStart};
+pub(crate) use follow::SampleSum;
+pub use paths::Paths;
 pub use rays::RayTracer;
 pub use scene::GpuScene;

@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod exr;
+pub mod jobs;
 pub mod picture;
 pub mod provenance;
 mod text;

@@ -13,11 +13,12 @@ use super::visible::{Visibility, facing};
 use super::{Atlas, AtlasParams, LightMap, fill, lookup, seam};
 use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;
-use crate::gpu::LightPaths;
+use crate::material::Surface;
 use crate::material::bsdf::Lobes;
 use crate::scene::{Emitter, Scene};
 use crate::transport::World;
-use crate::transport::path::PathParams;
+use crate::transport::follow::{Follow, OnCpu, Purpose};
+use crate::transport::path::{KnownDiffuse, PathParams};
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -96,13 +97,13 @@ pub struct Pass<'a> {
     /// Where paths read diffuse light.
     pub(super) known: Option<&'a LightMap>,
     /// Where they are followed; `None` for the CPU.
-    gpu: Option<&'a LightPaths>,
+    device: Option<&'a dyn Follow>,
 }
 
 impl<'a> Pass<'a> {
-    /// The same pass, its paths followed on a GPU, whose scene has the light map that they read.
-    pub fn on_gpu(self, gpu: Option<&'a LightPaths>) -> Self {
-        Self { gpu, ..self }
+    /// The same pass, its paths followed on a device, whose scene has the light map that they read.
+    pub fn on(self, device: Option<&'a dyn Follow>) -> Self {
+        Self { device, ..self }
     }
 }
 
@@ -131,12 +132,12 @@ impl<'a> Plan<'a> {
     /// The pass that traces a few paths in full, for the second to read its map; `None` if the second shall do without.
     pub fn first_pass(&self) -> Option<Pass<'static>> {
         let spp = self.params.first_spp;
-        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None, gpu: None })
+        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None, device: None })
     }
 
     /// The pass whose map counts; its paths read diffuse light from `known` and are traced in full without it.
     pub fn second_pass<'k>(&self, known: Option<&'k LightMap>) -> Pass<'k> {
-        Pass { spp: self.params.spp, seed: self.seed, known, gpu: None }
+        Pass { spp: self.params.spp, seed: self.seed, known, device: None }
     }
 
     /// Texel sides to bake.
@@ -171,13 +172,14 @@ impl<'a> Plan<'a> {
         for &b in &kept {
             progress.advance(self.block(b).len() as u64);
         }
+        let known = pass.known.map(|map| |s: &Surface, wo| map.diffuse_radiance(&self.world.scene, s, wo));
+        let known = known.as_ref().map(|known| known as KnownDiffuse);
+        let on_cpu = OnCpu { world: self.world, purpose: Purpose::Irradiance, known, params: self.params.path };
+        let device = pass.device.unwrap_or(&on_cpu);
         // A GPU is fed with many texels at once.
-        for group in todo.chunks(if pass.gpu.is_some() { GPU_BLOCKS } else { 1 }) {
+        for group in todo.chunks(if pass.device.is_some() { GPU_BLOCKS } else { 1 }) {
             let items: Vec<(u32, bool)> = group.iter().flat_map(|&b| self.block(b)).copied().collect();
-            let records = match pass.gpu {
-                None => items.par_iter().map(|&(texel, back)| self.texel(pass, texel as usize, back, progress)).collect(),
-                Some(gpu) => self.texels_on(gpu, pass, &items, progress)?,
-            };
+            let records = self.bake_texels(device, pass, &items, progress)?;
             for (&b, records) in group.iter().zip(records.chunks(BLOCK)) {
                 store.put(b, records)?;
             }

@@ -6,9 +6,9 @@ use super::visible::View;
 use crate::Result;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;
-use crate::gpu::{LightPaths, LightStart};
 use crate::material::Surface;
 use crate::transport::Sampler;
+use crate::transport::follow::{Follow, PathStart};
 use crate::transport::path::{KnownDiffuse, transmitted_irradiance};
 use rayon::prelude::*;
 
@@ -17,9 +17,6 @@ const TRIES: u32 = 4;
 
 /// Most regions of a texel that are told apart.
 const MAX_REGIONS: usize = 4;
-
-/// Paths that a GPU is given at once.
-const GPU_PATHS: usize = 1 << 21;
 
 /// The samples of a texel that count.
 struct Choice {
@@ -39,48 +36,24 @@ struct Sum {
 }
 
 impl Plan<'_> {
-    /// One texel's value and flags.
-    pub(super) fn texel(&self, pass: &Pass, texel: usize, back: bool, progress: &dyn Progress) -> Record {
-        let choice = self.choose(pass, texel, back);
-        let mut sums = vec![Sum::default(); choice.regions.len()];
-        for &(i, region) in &choice.samples {
-            let (surface, sampler) = self.draw(pass, texel, back, i);
-            let sum = &mut sums[region as usize];
-            sum.light += self.light(pass, &surface, back, sampler);
-            sum.count += 1;
-        }
-        progress.advance(1);
-        self.settle(&choice, &sums, back)
-    }
-
-    /// The same for many texels, whose paths a GPU follows.
-    pub(super) fn texels_on(
+    /// Values and flags of texel sides, whose paths `device` follows.
+    pub(super) fn bake_texels(
         &self,
-        gpu: &LightPaths,
+        device: &dyn Follow,
         pass: &Pass,
         items: &[(u32, bool)],
         progress: &dyn Progress,
     ) -> Result<Vec<Record>> {
         let mut records = Vec::with_capacity(items.len());
-        for items in items.chunks((GPU_PATHS / pass.spp as usize).max(1)) {
+        for items in items.chunks((device.batch() / pass.spp as usize).max(1)) {
             let choices: Vec<Choice> = items.par_iter().map(|&(texel, back)| self.choose(pass, texel as usize, back)).collect();
-            let starts: Vec<Vec<LightStart>> = items
-                .par_iter()
-                .zip(&choices)
-                .map(|(&(texel, back), choice)| {
-                    let start = |&(sample, _): &(u32, u8)| {
-                        let (surface, _) = self.draw(pass, texel as usize, back, sample);
-                        let stream = self.stream(pass, texel as usize, back);
-                        LightStart { triangle: surface.triangle, barycentric: surface.barycentric, back, stream, sample }
-                    };
-                    choice.samples.iter().map(start).collect()
-                })
-                .collect();
-            let mut lights = gpu.light(&starts.concat())?.into_iter();
+            let starts: Vec<Vec<PathStart>> =
+                items.par_iter().zip(&choices).map(|(&item, choice)| self.starts(pass, item, choice)).collect();
+            let mut lights = device.sums(&starts.concat(), &|_| ())?.into_iter();
             for (&(_, back), choice) in items.iter().zip(&choices) {
                 let mut sums = vec![Sum::default(); choice.regions.len()];
                 for (&(_, region), light) in choice.samples.iter().zip(&mut lights) {
-                    sums[region as usize].light += light;
+                    sums[region as usize].light += light.color;
                     sums[region as usize].count += 1;
                 }
                 records.push(self.settle(choice, &sums, back));
@@ -88,6 +61,18 @@ impl Plan<'_> {
             progress.advance(items.len() as u64);
         }
         Ok(records)
+    }
+
+    /// A path for each sample of a texel.
+    fn starts(&self, pass: &Pass, (texel, back): (u32, bool), choice: &Choice) -> Vec<PathStart> {
+        let stream = self.stream(pass, texel as usize, back);
+        let wo = [if back { -1.0 } else { 1.0 }, 0.0, 0.0];
+        let start = |&(sample, _): &(u32, u8)| {
+            let (surface, _) = self.draw(pass, texel as usize, back, sample);
+            let [u, v] = surface.barycentric.to_array();
+            PathStart { triangle: surface.triangle, u, v, stream, wo, first: sample, end: sample + 1, padding: [0; 3] }
+        };
+        choice.samples.iter().map(start).collect()
     }
 
     fn stream(&self, pass: &Pass, texel: usize, back: bool) -> u32 {

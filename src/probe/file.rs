@@ -214,10 +214,11 @@ impl Probe {
     }
 }
 
-/// `set.json` of a probe folder: written last, so its presence says that the set is whole.
+/// `set.json` of a probe folder: written last, so its presence says that the set is whole. `Served` says which views a set that does not
+/// hold every texel is for, in the words of the method that it was baked for; [`serde::de::IgnoredAny`] for a reader that does not ask.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BakedSet {
+pub struct BakedSet<Served> {
     /// Where the probes stand.
     pub grid: crate::probe::placement::ProbeGrid,
     /// Width and height of a probe, texels.
@@ -228,7 +229,7 @@ pub struct BakedSet {
     #[serde(default)]
     pub mirrored: bool,
     /// The views that it serves; `None` serves any.
-    pub views: Option<crate::method::glossy_probes::wanted::Views>,
+    pub views: Option<Served>,
     /// blake3 of every probe's file, hex, by index; empty where the views do not use the probe.
     pub files: Vec<String>,
     /// Where the set came from.

@@ -7,6 +7,8 @@ use crate::io::{ExrImage, atomic};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::Vec3;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,10 +17,10 @@ use std::sync::Arc;
 pub const SET_FILE: &str = "set.json";
 
 /// A probe folder, and those of its probes that are in memory.
-pub struct ProbeStore {
+pub struct ProbeStore<Served> {
     folder: PathBuf,
     /// The folder's `set.json`.
-    pub set: BakedSet,
+    pub set: BakedSet<Served>,
     /// Content hash of `set.json`.
     pub hash: String,
     triangles: usize,
@@ -28,7 +30,7 @@ pub struct ProbeStore {
     clock: u64,
 }
 
-impl ProbeStore {
+impl<Served: DeserializeOwned> ProbeStore<Served> {
     /// Opens a folder that was baked from `scene`; keeps at most `capacity` probes (at least 8) in memory.
     pub fn open(folder: &Path, scene: &Scene, capacity: usize) -> Result<Self> {
         let path = folder.join(SET_FILE);
@@ -37,7 +39,8 @@ impl ProbeStore {
                 if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
             Error::input(&path, format!("{e}{hint}"))
         })?;
-        let set: BakedSet = serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
+        let set: BakedSet<Served> =
+            serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
         set.provenance.check_scene(&path, &scene.hash)?;
         if set.files.len() != set.grid.len() {
             return Err(Error::input(&path, format!("{} files for {} probes", set.files.len(), set.grid.len())));
@@ -97,6 +100,6 @@ impl ProbeStore {
 }
 
 /// Writes `set.json`: the last step of a bake.
-pub fn write_set(folder: &Path, set: &BakedSet) -> Result<()> {
+pub fn write_set(folder: &Path, set: &BakedSet<impl Serialize>) -> Result<()> {
     atomic::write_json(&folder.join(SET_FILE), set)
 }

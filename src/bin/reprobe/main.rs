@@ -19,7 +19,7 @@ mod render_glossy;
 mod render_path;
 mod resmap;
 mod run;
-mod set_params;
+
 mod timings;
 mod views;
 

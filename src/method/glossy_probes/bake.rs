@@ -1,18 +1,18 @@
 //! Baking a probe: reflector, mirror-reflected and glossy maps at the resolution that its parameterisation gives (§4.1, §4.2.2, §6.1).
 
-use super::gpu::paths::ProbePaths;
 use crate::Result;
-use crate::base::math::{Rgb, hash_words, luminance};
+use crate::base::math::{Rgb, hash_words};
+use crate::base::named::{Parameters, within};
 use crate::base::progress::Progress;
 use crate::base::ray::{Hit, Ray};
-use crate::gpu::{PathStart, SampleSum};
 use crate::lightmap::LightMap;
 use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
 use crate::probe::parameter_map::ParameterMap;
-use crate::transport::path::{KnownDiffuse, PathParams, scattered};
-use crate::transport::{Sampler, World};
+use crate::transport::World;
+use crate::transport::follow::{Follow, OnCpu, PathStart, PathSum, Purpose, Seen};
+use crate::transport::path::{KnownDiffuse, PathParams};
 use crate::view::gbuffer::is_glossy;
 use crate::view::mirror::mirror_hit;
 use crate::view::mirror_light::mirror_light;
@@ -46,6 +46,21 @@ pub struct BakeParams {
 impl Default for BakeParams {
     fn default() -> Self {
         Self { spp: 2048, error: None, roughness_scale: 1.0, spread: false }
+    }
+}
+
+impl BakeParams {
+    /// What the paths of a texel are followed for.
+    pub fn query(&self) -> Query {
+        Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: self.roughness_scale }
+    }
+}
+
+impl Parameters for BakeParams {
+    fn validate(&self) -> Result<()> {
+        within("spp", self.spp, 1..=1 << 24)?;
+        self.error.map_or(Ok(()), |e| within("error", e, f32::MIN_POSITIVE..=1e9))?;
+        within("roughness_scale", self.roughness_scale, f32::MIN_POSITIVE..=1.0)
     }
 }
 
@@ -89,8 +104,8 @@ pub struct Bake<'a> {
     pub seed: u32,
     /// Diffuse light of the scene, read where a path leaves the glossy chain. *Ours*: the paper traces on.
     pub lightmap: Option<&'a LightMap>,
-    /// Where the paths are followed; `None` for the CPU.
-    pub gpu: Option<&'a ProbePaths>,
+    /// Where the paths are followed, made for [`BakeParams::query`] and [`PathParams::default`]; `None` for the CPU.
+    pub device: Option<&'a dyn Follow>,
 }
 
 /// What was traced for a probe.
@@ -102,22 +117,16 @@ pub struct Traced {
     pub paths: u64,
 }
 
-/// Sums over the paths of one texel.
+/// Sums over the paths of one texel, and how many they were.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     paths: u32,
-    color: Rgb,
-    /// Of luminance, and its square.
-    moments: [f64; 2],
+    of: PathSum,
 }
 
 impl Sums {
     fn and(self, other: Self) -> Self {
-        Self {
-            paths: self.paths + other.paths,
-            color: self.color + other.color,
-            moments: [self.moments[0] + other.moments[0], self.moments[1] + other.moments[1]],
-        }
+        Self { paths: self.paths + other.paths, of: self.of + other.of }
     }
 }
 
@@ -163,7 +172,7 @@ pub fn bake_glossy(
     let mirrored: Vec<Option<Rgb>> = centres.par_iter().map(|centre| mirrored(bake, probe, centre)).collect();
     for ((centre, sums), mirrored) in centres.iter().zip(sums).zip(mirrored) {
         let texel = &mut probe.texels[centre.texel as usize];
-        texel.set_glossy(sums.color / sums.paths as f32);
+        texel.set_glossy(sums.of.color / sums.paths as f32);
         texel.set_mirrored(mirrored.unwrap_or(Rgb::ZERO));
         traced.texels += 1;
         traced.paths += u64::from(sums.paths);
@@ -208,40 +217,37 @@ fn trace(
     range: &(dyn Fn(usize) -> Range<u32> + Sync),
     progress: Option<&dyn Progress>,
 ) -> Result<Vec<Sums>> {
-    let all: u64 = (0..centres.len()).map(|i| range(i).len() as u64).sum();
+    let start = |(i, centre): (usize, &Centre)| {
+        let Range { start: first, end } = range(i);
+        let Hit { triangle, u, v, .. } = centre.hit;
+        let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
+        PathStart { triangle, u, v, stream: centre.stream, wo: wo.into(), first, end, padding: [0; 3] }
+    };
+    let starts: Vec<PathStart> = centres.iter().enumerate().map(start).collect();
+    let all = starts.iter().map(|s| u64::from(s.samples())).sum();
     let rows = Rows { rows: u64::from(probe.map.size[1]), all, done: AtomicU64::new(0), progress };
-    let sums = match bake.gpu {
+    let done = |paths: usize| rows.advance(paths as u64);
+    let sums = match bake.device {
+        Some(device) => device.sums(&starts, &done)?,
         None => {
-            let texel = |(i, centre)| {
-                let sums = glossy_texel(bake, probe, centre, range(i));
-                rows.advance(sums.paths.into());
-                sums
-            };
-            centres.par_iter().enumerate().map(texel).collect()
-        }
-        Some(gpu) => {
-            let starts: Vec<PathStart> = centres
-                .iter()
-                .enumerate()
-                .map(|(i, centre)| {
-                    let Range { start: first, end } = range(i);
-                    let Hit { triangle, u, v, .. } = centre.hit;
-                    let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
-                    let stream = centre.stream;
-                    PathStart { triangle, u, v, stream, wo: wo.into(), first, end, padding: [0; 3] }
-                })
-                .collect();
-            let sums = gpu.sums(&starts, &|paths| rows.advance(paths as u64))?;
-            let of = |(start, sum): (&PathStart, SampleSum)| Sums {
-                paths: start.end.saturating_sub(start.first),
-                color: sum.color(),
-                moments: [luminance(sum.color()), sum.squares].map(f64::from),
-            };
-            starts.iter().zip(sums).map(of).collect()
+            let Bake { world, params, lightmap, .. } = *bake;
+            let known = lightmap.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&world.scene, s, wo));
+            let known = known.as_ref().map(|known| known as KnownDiffuse);
+            let spread = |i: usize, offset: Vec2| elsewhere(world, probe, &centres[i], offset);
+            let purpose = Purpose::Scattering(params.query(), params.spread.then_some(&spread as &Seen));
+            OnCpu { world, purpose, known, params: PathParams::default() }.sums(&starts, &done)?
         }
     };
     rows.finish();
-    Ok(sums)
+    Ok(starts.iter().zip(sums).map(|(start, of)| Sums { paths: start.samples(), of }).collect())
+}
+
+/// What a texel sees at an offset from its corner, where that is glossy and of the object that its centre sees.
+fn elsewhere(world: &World, probe: &Probe, centre: &Centre, offset: Vec2) -> Option<(Surface, Vec3)> {
+    let d = direction(&probe.map, centre.texel, offset);
+    let seen = world.intersect(&Ray::new(probe.position, d))?;
+    let object = world.scene.geometry.triangle_object[centre.hit.triangle as usize];
+    (seen.object == object && is_glossy(world, &seen, -d)).then_some((seen, -d))
 }
 
 /// Tells of paths in rows of the probe, whatever they are.
@@ -283,9 +289,9 @@ fn paths_for(error: f32, most: u32, pilot: &[Option<Sums>], i: u32, width: u32) 
         for column in [(x + width - 1) % width, x, (x + 1) % width] {
             let Some(s) = &pilot[(row * width + column) as usize] else { continue };
             let n = f64::from(s.paths);
-            squares += (s.moments[1] - s.moments[0] * s.moments[0] / n).max(0.0);
+            squares += (s.of.squares - s.of.luminance * s.of.luminance / n).max(0.0);
             degrees += n - 1.0;
-            sum += s.moments[0];
+            sum += s.of.luminance;
             paths += n;
         }
     }
@@ -294,30 +300,4 @@ fn paths_for(error: f32, most: u32, pilot: &[Option<Sums>], i: u32, width: u32) 
     }
     let allowed = f64::from(error) * (sum / paths + f64::from(ERROR_FLOOR));
     ((squares / degrees / (allowed * allowed)).ceil() as u32).clamp(PILOT.min(most), most)
-}
-
-/// Sums over those of the texel's paths.
-fn glossy_texel(bake: &Bake, probe: &Probe, of: &Centre, samples: Range<u32>) -> Sums {
-    let Bake { world, params, .. } = *bake;
-    let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: params.roughness_scale };
-    let (centre, to_centre) = (world.surface(&of.hit), direction(&probe.map, of.texel, Vec2::splat(0.5)));
-    let known = bake.lightmap.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&world.scene, s, wo));
-    let mut sums = Sums::default();
-    for sample in samples {
-        let mut sampler = Sampler::new(of.stream, sample);
-        let offset = sampler.next_2d();
-        let (mut surface, mut wo) = (centre, -to_centre);
-        if params.spread {
-            let d = direction(&probe.map, of.texel, offset);
-            let seen = world.intersect(&Ray::new(probe.position, d));
-            if let Some(s) = seen.filter(|s| s.object == centre.object && is_glossy(world, s, -d)) {
-                (surface, wo) = (s, -d);
-            }
-        }
-        let known = known.as_ref().map(|known| known as KnownDiffuse);
-        let color = scattered(world, &surface, wo, query, known, &PathParams::default(), &mut sampler);
-        let y = f64::from(luminance(color));
-        sums = sums.and(Sums { paths: 1, color, moments: [y, y * y] });
-    }
-    sums
 }

@@ -5,7 +5,9 @@
 //! alias. More rays through all passes cure it (three quarters of the error at 4 x 4 in place of 2 x 2), at four times the price; these are
 //! asked only what they see, and only where it matters. Emission and the diffuse layer are the rays' own.
 
+use crate::Result;
 use crate::base::math::Rgb;
+use crate::base::named::within;
 use crate::base::ray::Ray;
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
@@ -28,6 +30,13 @@ pub struct CoverageParams {
 impl Default for CoverageParams {
     fn default() -> Self {
         Self { rays: 4 }
+    }
+}
+
+impl CoverageParams {
+    /// An error where a parameter is out of its range.
+    pub fn validate(&self) -> Result<()> {
+        within("coverage.rays", self.rays, 0..=64)
     }
 }
 

@@ -7,7 +7,9 @@
 
 use super::candidates::Candidates;
 use super::perturb::{PerturbParams, Perturbation};
+use crate::Result;
 use crate::base::math::{Rgb, floor, fraction};
+use crate::base::named::within;
 use crate::material::bsdf::{Lobes, Query};
 use crate::probe::file::Probe;
 use crate::transport::World;
@@ -20,11 +22,14 @@ use serde::{Deserialize, Serialize};
 /// Most samples to each side of a search's centre.
 pub const MAX_RADIUS: i32 = 15;
 
+/// Most levels of a search.
+pub const MAX_LEVELS: usize = 8;
+
 /// One level of the neighbour search: (2 radius + 1)² samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SearchLevel {
-    /// Samples to each side of the centre; more than [`MAX_RADIUS`] count as that.
+    /// Samples to each side of the centre, [`MAX_RADIUS`] at the most.
     pub radius: i32,
     /// Distance between samples, texels of an undistorted map; scaled by the map's derivative.
     pub step: f32,
@@ -118,6 +123,22 @@ impl GatherParams {
             bilinear: BilinearRule::SameReflector,
             albedo_ratio: false,
         }
+    }
+
+    /// An error where a parameter is out of its range.
+    pub fn validate(&self) -> Result<()> {
+        within("gather.search: levels", self.search.len(), 1..=MAX_LEVELS)?;
+        for (i, level) in self.search.iter().enumerate() {
+            within(&format!("gather.search.{i}.radius"), level.radius, 0..=MAX_RADIUS)?;
+            within(&format!("gather.search.{i}.step"), level.step, 0.0..=1024.0)?;
+        }
+        within("gather.anchors", self.anchors, 1..=TILE)?;
+        within("gather.material_penalty", self.material_penalty, 0.0..=1e9)?;
+        within("gather.roughness_penalty", self.roughness_penalty, 0.0..=1e9)?;
+        within("gather.falloff", self.falloff, 0.0..=1e9)?;
+        within("gather.trilinear_power", self.trilinear_power, 0.0..=16.0)?;
+        within("gather.probes", self.probes, 1..=8)?;
+        self.perturb.validate()
     }
 
     /// A probe's weight at equal energy, for its trilinear weight t_i.

@@ -26,6 +26,9 @@ pub mod resmap;
 pub mod seen;
 pub mod wanted;
 
+use crate::Result;
+use crate::base::named::{Parameters, within};
+use crate::view::MOST_SUPERSAMPLES;
 use coverage::CoverageParams;
 use filter::FilterParams;
 use footprint::FootprintParams;
@@ -75,5 +78,15 @@ impl GlossyProbeParams {
             filter: FilterParams::paper(),
             coverage: CoverageParams { rays: 0 },
         }
+    }
+}
+
+impl Parameters for GlossyProbeParams {
+    fn validate(&self) -> Result<()> {
+        within("supersample", self.supersample, 1..=MOST_SUPERSAMPLES)?;
+        self.gather.validate()?;
+        self.footprint.as_ref().map_or(Ok(()), FootprintParams::validate)?;
+        self.filter.validate()?;
+        self.coverage.validate()
     }
 }

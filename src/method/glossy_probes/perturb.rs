@@ -27,7 +27,9 @@
 //! (the second-order part longer than the first) is cut there; where a concave reflector focuses the eye onto q
 //! (G singular), and for broken input, the reflector counts as a plane.
 
+use crate::Result;
 use crate::base::math::{Frame, reflect};
+use crate::base::named::within;
 use crate::surface::Curvature;
 use glam::{Mat2, Vec2, Vec3};
 
@@ -70,6 +72,13 @@ impl PerturbParams {
     /// The paper's text. (The limit is not infinite, which JSON could not say.)
     pub fn paper() -> Self {
         Self { exact_plane: false, second_order_limit: f32::MAX, min_focus: 1e-4, newton: 0, ..Self::default() }
+    }
+
+    /// An error where a parameter is out of its range.
+    pub fn validate(&self) -> Result<()> {
+        within("gather.perturb.second_order_limit", self.second_order_limit, 0.0..=f32::MAX)?;
+        within("gather.perturb.min_focus", self.min_focus, 0.0..=1.0)?;
+        within("gather.perturb.newton", self.newton, 0..=64)
     }
 }
 

@@ -7,6 +7,7 @@ use super::filter::{FilterInput, FilterParams, NOT_GLOSSY, filter};
 use super::footprint::{Footprint, GlossyPoint};
 use super::gather::{Gathered, gather};
 use super::previous::{Previous, reproject_previous};
+use super::wanted::Views;
 use crate::Result;
 use crate::base::clock::Clock;
 use crate::base::math::Rgb;
@@ -94,7 +95,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Renders the next frame of a path.
-    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore<Views>) -> Result<Frame> {
         let n = self.params.supersample;
         let fine = Camera { size: camera.size.map(|s| s * n), ..camera.clone() };
         let size = fine.size.map(|s| s as usize);

@@ -15,9 +15,12 @@
 
 pub mod gpu;
 
+use crate::Result;
 use crate::base::math::{Rgb, hash_words, unit};
+use crate::base::named::{Parameters, within};
 use crate::lightmap::LightMap;
 use crate::transport::World;
+use crate::view::MOST_SUPERSAMPLES;
 use crate::view::gbuffer::{GBuffer, Pixel, glossy};
 use crate::view::mirror_light::{ChainParams, glossy_albedo, mirror_chain};
 use glam::Vec2;
@@ -84,6 +87,19 @@ impl ImageSpaceGatherParams {
     /// Mirror rays in a row, bounded.
     pub(crate) fn rays(&self) -> u32 {
         self.mirror_depth.min(MOST_RAYS)
+    }
+}
+
+impl Parameters for ImageSpaceGatherParams {
+    fn validate(&self) -> Result<()> {
+        within("supersample", self.supersample, 1..=MOST_SUPERSAMPLES)?;
+        within("samples", self.samples, 1..=MOST_TAPS)?;
+        within("search_samples", self.search_samples, 1..=MOST_TAPS)?;
+        within("mirror_depth", self.mirror_depth, 1..=MOST_RAYS)?;
+        within("max_mirror_alpha", self.max_mirror_alpha, 0.0..=1.0)?;
+        within("max_radius", self.max_radius, 0.0..=MAX_RADIUS)?;
+        within("min_normal_cos", self.min_normal_cos, -1.0..=1.0)?;
+        within("plane_sigma", self.plane_sigma, 1e-6..=1e6)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::Result;
 use crate::gpu::Gpu;
 use crate::gpu::camera::GpuCamera;
 use crate::gpu::commands::Commands;
-use crate::gpu::follow::{Follow, PathStart, Place, Purpose, SampleSum, WORKGROUP, most_starts};
+use crate::gpu::follow::{Place, Purpose, SampleSum, Samples, WORKGROUP, most_starts};
 use crate::gpu::kernel::{Kernel, shader};
 use crate::gpu::pace::Pace;
 use crate::gpu::scene::{MATERIALS, RAYS};
@@ -13,6 +13,7 @@ use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
 use crate::transport::World;
+use crate::transport::follow::PathStart;
 use crate::view::gbuffer::GLOSSY;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -38,7 +39,7 @@ fn source() -> String {
 pub struct LightmapRt {
     baseline: Baseline,
     starts: Kernel,
-    follow: Follow,
+    follow: Samples,
     mean: Kernel,
     pace: Pace,
 }
@@ -51,7 +52,7 @@ impl LightmapRt {
         let place = Place { branch: None, first_set: 0 };
         Ok(Self {
             starts: Kernel::new(&gpu, &source(), "view_starts")?,
-            follow: Follow::new(baseline.scene.clone(), &params.path(), purpose, place)?,
+            follow: Samples::new(baseline.scene.clone(), &params.path(), purpose, place)?,
             mean: Kernel::new(&gpu, &source(), "mean_light")?,
             pace: Pace::new(4096),
             baseline,

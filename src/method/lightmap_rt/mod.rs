@@ -9,11 +9,14 @@
 
 pub mod gpu;
 
+use crate::Result;
 use crate::base::math::{Rgb, hash_words};
+use crate::base::named::{Parameters, within};
 use crate::lightmap::LightMap;
 use crate::material::Surface;
 use crate::transport::path::{PathParams, scattered};
 use crate::transport::{Sampler, World};
+use crate::view::MOST_SUPERSAMPLES;
 use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel, glossy};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -47,6 +50,14 @@ impl LightmapRtParams {
     /// The rays as a path: their last hit is a vertex, too.
     pub(crate) fn path(&self) -> PathParams {
         PathParams { max_depth: self.bounces.min(MOST_BOUNCES) + 1, rr_depth: u32::MAX }
+    }
+}
+
+impl Parameters for LightmapRtParams {
+    fn validate(&self) -> Result<()> {
+        within("supersample", self.supersample, 1..=MOST_SUPERSAMPLES)?;
+        within("samples", self.samples, 1..=1 << 24)?;
+        within("bounces", self.bounces, 1..=u32::MAX)
     }
 }
 

@@ -4,12 +4,13 @@ use crate::Result;
 use crate::base::math::Rgb;
 use crate::base::progress::Progress;
 use crate::gpu::camera::GpuCamera;
-use crate::gpu::follow::{Follow, PathStart, Place, Purpose, SampleSum, WORKGROUP, most_starts};
+use crate::gpu::follow::{Place, Purpose, SampleSum, Samples, WORKGROUP, most_starts};
 use crate::gpu::kernel::{Kernel, shader};
 use crate::gpu::pace::Pace;
 use crate::gpu::scene::{GpuScene, MATERIALS, PATHS, RAYS};
 use crate::material::bsdf::{Lobes, Query};
 use crate::scene::Camera;
+use crate::transport::follow::PathStart;
 use crate::transport::path::PathParams;
 use crate::view::layers::LayerImages;
 use bytemuck::{Pod, Zeroable};
@@ -51,7 +52,7 @@ pub struct PathTracer {
     hits: Kernel,
     add: Kernel,
     /// One for each quantity but the emission: the halves of the first vertex, or the whole.
-    paths: Vec<Follow>,
+    paths: Vec<Samples>,
 }
 
 impl PathTracer {
@@ -61,7 +62,7 @@ impl PathTracer {
         let add = Kernel::new(&scene.gpu, shader!("add_samples"), "add_samples")?;
         // After the set that the camera ray has drawn.
         let place = Place { branch: None, first_set: 1 };
-        let whole = Follow::new(scene.clone(), path, Purpose::Scattering(Query::default()), place)?;
+        let whole = Samples::new(scene.clone(), path, Purpose::Scattering(Query::default()), place)?;
         let half = |lobes, k| whole.half(lobes, Place { branch: Some(k), first_set: 0 });
         let paths = if layers { vec![half(Lobes::DIFFUSE, 0), half(Lobes::NON_DIFFUSE, 1)] } else { vec![whole] };
         Ok(Self { scene, hits, add, paths })

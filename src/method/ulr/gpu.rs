@@ -19,6 +19,7 @@ use crate::scene::Camera;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use bytemuck::{Pod, Zeroable};
+use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
 /// Edges of a workgroup, pixels.
@@ -145,14 +146,14 @@ impl Ulr {
     }
 
     /// Renders a frame.
-    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore<impl DeserializeOwned>) -> Result<Frame> {
         let (gpu, target) = (self.gpu.clone(), self.reserved(camera.size, probes.set.size)?);
         let frame = gpu.checked(|| self.passes(&target, camera, probes))??;
         self.target = Some(target);
         Ok(frame)
     }
 
-    fn passes(&mut self, t: &Target, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+    fn passes(&mut self, t: &Target, camera: &Camera, probes: &mut ProbeStore<impl DeserializeOwned>) -> Result<Frame> {
         let (gpu, view, eye) = (&*self.gpu, &t.view, camera.position());
         let fine = Camera { size: view.size, ..camera.clone() };
         let groups = groups(view.size, WORKGROUP);

@@ -18,10 +18,13 @@
 
 pub mod gpu;
 
+use crate::Result;
 use crate::base::math::{Rgb, floor, fraction};
+use crate::base::named::{Parameters, within};
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
 use crate::probe::placement::ProbeGrid;
 use crate::transport::World;
+use crate::view::MOST_SUPERSAMPLES;
 use crate::view::gbuffer::{GBuffer, Pixel, glossy};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -33,6 +36,9 @@ const MIN_PENALTY: f32 = 1e-3;
 /// How far a texel that sees the same surface may lie from the point, as a fraction of the probe's distance: a slanted surface spreads
 /// a texel far.
 const MAX_SPREAD: f32 = 0.2;
+
+/// Most probes that a pixel blends.
+const MOST_BLENDED: u32 = 64;
 
 /// Parameters of the method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,6 +63,18 @@ pub struct UlrParams {
 impl Default for UlrParams {
     fn default() -> Self {
         Self { supersample: 1, blend: 4, probes: 64, angle: 1.0, resolution: 0.1, hidden: 10.0, plane_tolerance: 0.01 }
+    }
+}
+
+impl Parameters for UlrParams {
+    fn validate(&self) -> Result<()> {
+        within("supersample", self.supersample, 1..=MOST_SUPERSAMPLES)?;
+        within("blend", self.blend, 1..=MOST_BLENDED)?;
+        within("probes", self.probes, 1..=1 << 20)?;
+        within("angle", self.angle, 0.0..=1e9)?;
+        within("resolution", self.resolution, 0.0..=1e9)?;
+        within("hidden", self.hidden, 0.0..=1e9)?;
+        within("plane_tolerance", self.plane_tolerance, 0.0..=1e9)
     }
 }
 

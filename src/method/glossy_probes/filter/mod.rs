@@ -14,7 +14,9 @@
 
 pub(crate) mod four_pass;
 
+use crate::Result;
 use crate::base::math::Rgb;
+use crate::base::named::within;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -60,7 +62,7 @@ pub struct FilterParams {
     pub min_normal_cos: f32,
     /// Largest difference in depth that may mix, α_d, m. Paper: 0.2; ours, 0.15.
     pub depth_threshold: f32,
-    /// Lower clamp of E in the confidence 1/E; infinite for no confidence at all. Paper: none (a small one against 0).
+    /// Lower clamp of E in the confidence 1/E; very large for no confidence at all. Paper: none (a small one against 0).
     pub min_energy: f32,
     /// Radius of a Gaussian, in sigmas.
     pub radius_sigmas: f32,
@@ -86,6 +88,15 @@ impl FilterParams {
     /// The paper's text.
     pub fn paper() -> Self {
         Self { min_normal_cos: 0.8, depth_threshold: 0.2, min_energy: 1e-3, ..Self::default() }
+    }
+
+    /// An error where a parameter is out of its range.
+    pub fn validate(&self) -> Result<()> {
+        within("filter.min_normal_cos", self.min_normal_cos, -1.0..=1.0)?;
+        within("filter.depth_threshold", self.depth_threshold, 0.0..=f32::MAX)?;
+        within("filter.min_energy", self.min_energy, f32::MIN_POSITIVE..=f32::MAX)?;
+        within("filter.radius_sigmas", self.radius_sigmas, 0.1..=16.0)?;
+        within("filter.max_radius", self.max_radius, 0.0..=4096.0)
     }
 }
 

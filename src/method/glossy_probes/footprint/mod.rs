@@ -18,7 +18,9 @@
 //! ([`Foreshortening::Paper`]). The same G with the reflector's curvature narrows the footprint on convex reflectors.
 
 use super::perturb::path_hessian;
+use crate::Result;
 use crate::base::math::Frame;
+use crate::base::named::within;
 use crate::scene::Camera;
 use crate::surface::Curvature;
 use glam::{Vec2, Vec3};
@@ -88,6 +90,13 @@ impl FootprintParams {
     /// The paper's text.
     pub fn paper() -> Self {
         Self { fit: Fit::Moment, roughness_scale: 1.0, small_d_r: 0.5, foreshortening: Foreshortening::Paper, ..Self::default() }
+    }
+
+    /// An error where a parameter is out of its range.
+    pub fn validate(&self) -> Result<()> {
+        within("footprint.roughness_scale", self.roughness_scale, 0.0..=1.0)?;
+        within("footprint.small_d_r", self.small_d_r, 0.0..=1e9)?;
+        within("footprint.fov_degrees", self.fov_degrees, 1.0..=179.0)
     }
 
     /// The parameters for probes that were baked at `roughness_scale`.

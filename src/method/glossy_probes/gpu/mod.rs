@@ -6,13 +6,13 @@ pub(crate) mod coverage;
 pub mod filter;
 pub(crate) mod footprint;
 pub(crate) mod gather;
-pub mod paths;
 pub(crate) mod probes;
 
 use super::GlossyProbeParams;
 use super::candidates::Candidates;
 use super::gather::Gathered;
 use super::renderer::{Buffers, Frame, nearest_probes};
+use super::wanted::Views;
 use crate::Result;
 use crate::base::clock::Clock;
 use crate::gpu::Gpu;
@@ -175,14 +175,20 @@ impl<'a> Renderer<'a> {
     }
 
     /// Renders the next frame of a path; meanwhile probes are uploaded for the one after it, where there is `next`.
-    pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
+    pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore<Views>) -> Result<Frame> {
         let (gpu, mut target) = (self.gpu.clone(), self.reserved(camera.size, probes.set.size)?);
         let frame = gpu.checked(|| self.passes(&mut target, camera, next, probes))??;
         self.target = Some(target);
         Ok(frame)
     }
 
-    fn passes(&mut self, t: &mut Target, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
+    fn passes(
+        &mut self,
+        t: &mut Target,
+        camera: &Camera,
+        next: Option<&Camera>,
+        probes: &mut ProbeStore<Views>,
+    ) -> Result<Frame> {
         let (gpu, params, eye) = (&*self.gpu, &self.params, camera.position());
         let fine = Camera { size: t.view.size, ..camera.clone() };
         let albedos = params.gather.albedo_ratio.then_some(self.roughness_scale);

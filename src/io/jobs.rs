@@ -1,0 +1,117 @@
+//! The loop that every long stage runs: items that an earlier run has finished are kept, the others of this shard are made, and when none is
+//! missing the whole is sealed.
+
+use super::{ExrImage, Provenance};
+use crate::Result;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// `--shard I/N`: items I, I + N, I + 2N, ...
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    index: u32,
+    count: u32,
+}
+
+impl Shard {
+    /// Whether item `i` is this shard's.
+    pub fn has(&self, i: usize) -> bool {
+        i % self.count as usize == self.index as usize
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parsed {
+            Some((index, count)) if index < count => Ok(Self { index, count }),
+            _ => Err("expected I/N with I from 0 to N-1, like 0/4".into()),
+        }
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// What became of a stage's items.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Done {
+    /// Made now.
+    pub made: usize,
+    /// Found finished, of this shard and of others.
+    pub kept: usize,
+    /// Of other shards, and not made yet.
+    pub missing: usize,
+}
+
+/// Whether an earlier run with the same inputs and parameters finished this file.
+pub fn is_finished(file: &Path, provenance: &Provenance) -> bool {
+    ExrImage::read_provenance(file).is_ok_and(|found| found.as_ref() == Some(provenance))
+}
+
+/// Makes those of `items` that are not kept and are `shard`'s, in order; and when all are there, seals the whole.
+///
+/// # Errors
+/// What `make` or `seal` come to.
+pub fn complete(
+    items: &[usize],
+    shard: Option<Shard>,
+    is_kept: &(dyn Fn(usize) -> bool + Sync),
+    make: impl FnOnce(&[usize]) -> Result<()>,
+    seal: impl FnOnce() -> Result<()>,
+) -> Result<Done> {
+    let kept: Vec<bool> = items.par_iter().map(|&i| is_kept(i)).collect();
+    let open = || items.iter().zip(&kept).filter(|(_, kept)| !**kept).map(|(&i, _)| i);
+    let is_mine = |i: &usize| shard.is_none_or(|s| s.has(*i));
+    let todo: Vec<usize> = open().filter(is_mine).collect();
+    make(&todo)?;
+    // Another shard may have been at work meanwhile.
+    let missing = open().filter(|i| !is_mine(i) && !is_kept(*i)).count();
+    if missing == 0 {
+        seal()?;
+    }
+    Ok(Done { made: todo.len(), kept: items.len() - todo.len() - missing, missing })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::sync::Mutex;
+
+    #[test]
+    fn shards_make_what_is_theirs_and_the_last_one_seals() {
+        let there = Mutex::new(BTreeSet::from([3]));
+        let mut sealed = 0;
+        let mut run = |shard: Option<&str>| {
+            let shard = shard.map(|s| s.parse().unwrap());
+            let make = |todo: &[usize]| {
+                there.lock().unwrap().extend(todo);
+                Ok(())
+            };
+            let is_kept = |i| there.lock().unwrap().contains(&i);
+            let done = complete(&[1, 2, 3, 4, 6], shard, &is_kept, make, || {
+                sealed += 1;
+                Ok(())
+            });
+            (done.unwrap(), sealed)
+        };
+        assert_eq!(run(Some("0/2")), (Done { made: 3, kept: 1, missing: 1 }, 0));
+        assert_eq!(run(Some("0/2")), (Done { made: 0, kept: 4, missing: 1 }, 0));
+        assert_eq!(run(Some("1/2")), (Done { made: 1, kept: 4, missing: 0 }, 1));
+        assert_eq!(run(None), (Done { made: 0, kept: 5, missing: 0 }, 2));
+    }
+
+    #[test]
+    fn shards_parse_and_print() {
+        assert_eq!("2/3".parse::<Shard>().unwrap().to_string(), "2/3");
+        for bad in ["", "3/3", "1", "a/2", "0/0", "-1/2"] {
+            assert!(bad.parse::<Shard>().is_err(), "{bad}");
+        }
+    }
+}
