@@ -21,6 +21,7 @@ pub mod lightmap;
 pub mod material;
 pub mod method;
 pub mod metric;
+pub mod plan;
 pub mod probe;
 pub mod scene;
 pub mod surface;

@@ -3,23 +3,25 @@
 use std::time::Instant;
 
 /// Milliseconds of one pass after the other.
-pub(crate) struct Clock {
+pub struct Clock {
     last: Instant,
-    pub(crate) laps: Vec<(&'static str, f64)>,
+    /// Passes in order, and their milliseconds.
+    pub laps: Vec<(&'static str, f64)>,
 }
 
 impl Clock {
-    pub(crate) fn start() -> Self {
+    /// Begins.
+    pub fn start() -> Self {
         Self { last: Instant::now(), laps: Vec::new() }
     }
 
     /// Leaves out what happened since the last lap.
-    pub(crate) fn restart(&mut self) {
+    pub fn restart(&mut self) {
         self.last = Instant::now();
     }
 
     /// Notes what has passed since the last lap, added to what `pass` took before.
-    pub(crate) fn lap(&mut self, pass: &'static str) {
+    pub fn lap(&mut self, pass: &'static str) {
         let now = Instant::now();
         let ms = (now - self.last).as_secs_f64() * 1e3;
         match self.laps.iter_mut().find(|(name, _)| *name == pass) {
@@ -28,4 +30,17 @@ impl Clock {
         }
         self.last = now;
     }
+}
+
+/// Seconds since this call, rounded to microseconds.
+pub fn seconds() -> impl Fn() -> f64 {
+    let start = Instant::now();
+    move || (start.elapsed().as_secs_f64() * 1e6).round() / 1e6
+}
+
+/// The result of `work` and its milliseconds.
+pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let clock = seconds();
+    let result = work();
+    (result, clock() * 1e3)
 }

@@ -13,6 +13,7 @@ use super::visible::{Visibility, facing};
 use super::{Atlas, AtlasParams, LightMap, fill, lookup, seam};
 use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;
+use crate::io::jobs::{Done, Shard, complete};
 use crate::material::Surface;
 use crate::material::bsdf::Lobes;
 use crate::scene::{Emitter, Scene};
@@ -47,7 +48,7 @@ pub(super) const SPLIT: u32 = 4;
 /// All parameters of a bake but the seed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BakeParams {
+pub struct LightMapParams {
     /// Samples a texel. Paper, §7.2: 2048; ours by default 256.
     pub spp: u32,
     /// Texel size.
@@ -58,7 +59,7 @@ pub struct BakeParams {
     pub first_spp: u32,
 }
 
-impl Default for BakeParams {
+impl Default for LightMapParams {
     fn default() -> Self {
         Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default(), first_spp: 0 }
     }
@@ -76,7 +77,7 @@ pub struct Baked {
 /// A bake that is ready to start: what is sampled where.
 pub struct Plan<'a> {
     pub(super) world: &'a World,
-    pub(super) params: BakeParams,
+    pub(super) params: LightMapParams,
     seed: u32,
     /// The atlas.
     pub atlas: Atlas,
@@ -109,7 +110,7 @@ impl<'a> Pass<'a> {
 
 impl<'a> Plan<'a> {
     /// Cuts the charts, finds the solids, and leaves out the sides that nobody sees or no light reaches.
-    pub fn new(world: &'a World, params: &BakeParams, seed: u32) -> Result<Self> {
+    pub fn new(world: &'a World, params: &LightMapParams, seed: u32) -> Result<Self> {
         if params.spp == 0 {
             return Err(Error::Request("--spp 0: expected at least 1".into()));
         }
@@ -164,28 +165,36 @@ impl<'a> Plan<'a> {
         self.items.chunks(BLOCK).nth(block as usize).unwrap_or_default()
     }
 
-    /// Bakes a pass's blocks for which `mine` holds and which `store` does not have yet; returns how many it had.
-    pub fn run(&self, pass: &Pass, store: &dyn Store, mine: &dyn Fn(u32) -> bool, progress: &dyn Progress) -> Result<u32> {
-        let blocks: Vec<u32> = (0..self.blocks()).filter(|&b| mine(b)).collect();
-        progress.start("Light map", blocks.iter().map(|&b| self.block(b).len() as u64).sum());
-        let (kept, todo): (Vec<u32>, Vec<u32>) = blocks.into_iter().partition(|&b| self.has(store, b));
-        for &b in &kept {
-            progress.advance(self.block(b).len() as u64);
-        }
+    /// Bakes a pass's blocks that are `shard`'s and that `store` does not have yet; once all are there, `seal` follows.
+    pub fn run(
+        &self,
+        pass: &Pass,
+        store: &dyn Store,
+        shard: Option<Shard>,
+        progress: &dyn Progress,
+        seal: impl FnOnce() -> Result<()>,
+    ) -> Result<Done> {
+        let blocks: Vec<usize> = (0..self.blocks() as usize).collect();
+        let is_kept = |b: usize| self.has(store, b as u32);
+        complete(&blocks, shard, &is_kept, |todo| self.bake_blocks(pass, store, todo, progress), seal)
+    }
+
+    fn bake_blocks(&self, pass: &Pass, store: &dyn Store, todo: &[usize], progress: &dyn Progress) -> Result<()> {
+        progress.start("Light map", todo.iter().map(|&b| self.block(b as u32).len() as u64).sum());
         let known = pass.known.map(|map| |s: &Surface, wo| map.diffuse_radiance(&self.world.scene, s, wo));
         let known = known.as_ref().map(|known| known as KnownDiffuse);
         let on_cpu = OnCpu { world: self.world, purpose: Purpose::Irradiance, known, params: self.params.path };
         let device = pass.device.unwrap_or(&on_cpu);
         // A GPU is fed with many texels at once.
         for group in todo.chunks(if pass.device.is_some() { GPU_BLOCKS } else { 1 }) {
-            let items: Vec<(u32, bool)> = group.iter().flat_map(|&b| self.block(b)).copied().collect();
+            let items: Vec<(u32, bool)> = group.iter().flat_map(|&b| self.block(b as u32)).copied().collect();
             let records = self.bake_texels(device, pass, &items, progress)?;
             for (&b, records) in group.iter().zip(records.chunks(BLOCK)) {
-                store.put(b, records)?;
+                store.put(b as u32, records)?;
             }
         }
         progress.finish();
-        Ok(kept.len() as u32)
+        Ok(())
     }
 
     /// Whether `store` has a finished block.

@@ -1,6 +1,6 @@
 //! The bake against closed forms, and the three ways in which light maps leak.
 
-use super::bake::{BakeParams, Pass, Plan};
+use super::bake::{LightMapParams, Pass, Plan};
 use super::parts::{Memory, Store};
 use super::{AtlasParams, LightMap, testing};
 use crate::base::math::Rgb;
@@ -32,11 +32,11 @@ fn scene(geometry: Geometry, material: Material, emitters: Vec<Emitter>) -> Scen
     Scene { geometry, materials: vec![material], emitters, ..Default::default() }
 }
 
-fn params(texel: f32, spp: u32) -> BakeParams {
-    BakeParams { spp, atlas: AtlasParams { texel: Some(texel), ..Default::default() }, ..Default::default() }
+fn params(texel: f32, spp: u32) -> LightMapParams {
+    LightMapParams { spp, atlas: AtlasParams { texel: Some(texel), ..Default::default() }, ..Default::default() }
 }
 
-fn bake(world: &World, params: &BakeParams) -> LightMap {
+fn bake(world: &World, params: &LightMapParams) -> LightMap {
     let plan = Plan::new(world, params, 1).unwrap();
     let map = |pass: &Pass| {
         let store = Memory::default();
@@ -96,7 +96,7 @@ fn a_first_pass_finds_the_light_of_a_glowing_box_with_less_noise() {
     let sensor = Some(Camera::look_at(Vec3::ZERO, Vec3::X, Vec3::Y, 1.0, [4, 4]));
     let world = World::new(Scene { sensor, ..scene(g, diffuse(0.5), vec![emitter]) });
     let errors = |first_spp: u32| {
-        let map = bake(&world, &BakeParams { first_spp, ..params(0.25, 16) });
+        let map = bake(&world, &LightMapParams { first_spp, ..params(0.25, 16) });
         let places = (0..12).flat_map(|t| [Vec2::splat(0.3), Vec2::new(0.7, 0.2), Vec2::new(0.1, 0.8)].map(|b| (t, b)));
         let errors: Vec<f32> = places.map(|(t, b)| map.lookup(t, b, false).x / (2.0 * PI) - 1.0).collect();
         let n = errors.len() as f32;

@@ -31,5 +31,5 @@ pub mod texels;
 pub mod visible;
 
 pub use atlas::{Atlas, AtlasParams};
-pub use bake::{BakeParams, Baked, Plan};
+pub use bake::{Baked, LightMapParams, Plan};
 pub use lookup::LightMap;

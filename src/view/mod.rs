@@ -1,6 +1,7 @@
 //! What every method that renders views shares: G-buffer, mirror rays and their light, layers, auxiliary layers.
 
 pub mod aov;
+pub mod baseline;
 pub mod composite;
 pub mod gbuffer;
 pub mod layers;

@@ -1,10 +1,8 @@
 //! `reprobe curvature`.
 
-use crate::common::{Common, Outcome};
-use reprobe::io::Provenance;
-use reprobe::surface::{CurvatureParams, curvature, curvature_file};
+use reprobe::plan::stages::Curvature;
+use reprobe::surface::CurvatureParams;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Estimates the principal curvatures at every vertex
 #[derive(clap::Args)]
@@ -22,25 +20,10 @@ pub struct Args {
     no_tessellation: bool,
 }
 
-pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
-    if !(0.0..=90.0).contains(&args.regularize) {
-        anyhow::bail!("--regularize {}: expected 0 to 90 degrees", args.regularize);
+impl Args {
+    /// What the arguments come to.
+    pub fn stage(self) -> Curvature {
+        let Self { scene, output, regularize, no_tessellation } = self;
+        Curvature { scene, output, regularize: Some(regularize), no_tessellation }
     }
-    let mut params = CurvatureParams { regularize_degrees: args.regularize, ..CurvatureParams::default() };
-    if args.no_tessellation {
-        params.tessellation.max_triangles = 0;
-    }
-    let world = common.opaque_world(&args.scene)?;
-    let scene = &world.scene;
-    let start = Instant::now();
-    let map = curvature(&scene.geometry, &params, &common.progress());
-    let seconds = start.elapsed().as_secs_f64();
-    curvature_file::write(&map, &args.output, Provenance::new("curvature", &scene.hash, common.seed, &params))?;
-    let curved = map.k1.iter().zip(&map.k2).filter(|(a, b)| **a != 0.0 || **b != 0.0).count();
-    let (vertices, triangles) = (map.k1.len(), scene.geometry.triangles.len());
-    Ok(Outcome {
-        summary: format!("{}: {vertices} vertices, {curved} of them curved, in {seconds:.2} s", args.output.display()),
-        figures: serde_json::json!({"vertices": vertices, "triangles": triangles, "curved": curved, "seconds": seconds}),
-        check_failed: false,
-    })
 }

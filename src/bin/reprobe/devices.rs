@@ -1,7 +1,7 @@
 //! `reprobe devices`.
 
-use crate::common::{Common, Outcome};
 use reprobe::gpu::{Adapter, adapters};
+use reprobe::plan::Outcome;
 use serde_json::json;
 
 /// List the devices that this machine has
@@ -14,7 +14,7 @@ use serde_json::json;
   reprobe resmap room/scene.xml --probes probes.json -o resmap/ --device gpu:llvmpipe")]
 pub struct Args {}
 
-pub fn run(_: &Args, _: &Common) -> anyhow::Result<Outcome> {
+pub fn run(_: &Args) -> anyhow::Result<Outcome> {
     let list = adapters();
     let threads = rayon::current_num_threads();
     let mut lines = vec![format!("cpu: {threads} threads; every command")];

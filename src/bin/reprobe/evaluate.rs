@@ -1,24 +1,21 @@
 //! `reprobe evaluate`: methods and ablations against one reference.
 
-mod costs;
-mod measure;
-mod plan;
-mod variant;
+use crate::preset::Preset;
+use reprobe::plan::evaluation::{Evaluate, all_variants};
+use reprobe::plan::option::Size;
+use reprobe::plan::settings::Settings;
+use reprobe::plan::variant::{Given, Variant, parse_bake};
+use reprobe::plan::views::FrameList;
+use reprobe::plan::{Context, Outcome};
+use serde_json::json;
+use std::path::PathBuf;
 
-use crate::common::{Common, Outcome, parse_size};
-use crate::pipeline::{Preset, Settings};
-use crate::views::{FrameList, parse_frames, views};
-use anyhow::bail;
-use costs::execute;
-use measure::{Subjects, file, layers, measure};
-use plan::{frames_folder, plan, reference_folder};
-use reprobe::io::provenance::hash_file;
-use reprobe::io::{Provenance, atomic};
-use reprobe::metric::evaluation::{Costs, Evaluation, MethodErrors, html, markdown};
-use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
-use std::time::Instant;
-use variant::{Ablations, Given, Variant, WHOLE, parse_bake};
+/// Experiments that are known by name
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Ablations {
+    /// Figures 12 to 15 of Rodriguez et al. 2020
+    Paper,
+}
 
 /// Evaluate methods and ablations against references
 ///
@@ -78,10 +75,10 @@ pub struct Args {
     #[arg(long, value_name = "STAGE:--OPTION=VALUE", value_parser = parse_bake)]
     bake: Vec<(String, Given)>,
     /// Size of the frames
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<[u32; 2]>,
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
     /// Only these frames of the path
-    #[arg(long, value_name = "LIST", value_parser = parse_frames)]
+    #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
     /// Rays a pixel along one side, of methods that read bakes
     #[arg(long, value_name = "N")]
@@ -105,7 +102,7 @@ pub struct Args {
 
 impl Args {
     fn settings(&self) -> Settings {
-        let preset = self.preset.settings(true);
+        let preset = reprobe::plan::settings::Preset::from(self.preset).settings(true);
         let stage = |stage: &str, option: &str| self.bake.iter().find(|(s, (o, _))| s == stage && o == option);
         let count = stage("place-probes", "--count").and_then(|(_, (_, value))| value.as_ref()?.parse().ok());
         Settings {
@@ -117,135 +114,31 @@ impl Args {
             ..preset
         }
     }
-
-    /// All that is asked for, in order.
-    fn all_variants(&self, probes: u32) -> anyhow::Result<Vec<Variant>> {
-        let mut all = self.methods.clone();
-        let whole = || Variant::plain(WHOLE).map_err(anyhow::Error::msg);
-        let wants_whole = self.ablations.is_some() || self.variants.is_empty() && all.is_empty();
-        if wants_whole && !self.methods.iter().chain(&self.variants).any(|v| v.name == WHOLE) {
-            all.insert(0, whole()?);
-        }
-        all.extend(self.variants.iter().cloned());
-        if self.ablations.is_some() {
-            let known = variant::paper(probes).map_err(anyhow::Error::msg)?;
-            let named = |name: &String| known.iter().any(|v| v.name == *name);
-            if let Some(wrong) = self.only.iter().find(|name| !named(name)) {
-                let names: Vec<&str> = known.iter().map(|v| v.name.as_str()).collect();
-                bail!("--only {wrong}: no such ablation; there are {}", names.join(", "));
-            }
-            // With what they are compared with.
-            let asked = |v: &Variant| self.only.is_empty() || self.only.contains(&v.name);
-            let base = |v: &Variant| known.iter().any(|w| asked(w) && w.ablation.as_ref().is_some_and(|a| a.against == v.name));
-            all.extend(known.iter().filter(|v| asked(v) || base(v)).cloned());
-        }
-        if let Some(twice) = all.iter().enumerate().find(|(i, v)| all[..*i].iter().any(|w| w.name == v.name)) {
-            bail!("{}: two methods have this name; give one of them another with --variant NAME=METHOD", twice.1.name);
-        }
-        Ok(all)
-    }
 }
 
-pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
-    let began = Instant::now();
-    if !(-32.0..=32.0).contains(&args.exposure) {
-        bail!("--exposure {}: expected -32 to 32 stops", args.exposure);
-    }
-    let mut settings = args.settings();
-    let variants = args.all_variants(settings.probes)?;
-    settings.all_texels |= variants.iter().any(|v| v.method.reads_any_texel());
-    let (size, reference_spp) = (settings.size, settings.reference_spp);
-    let plan = plan(args, common, settings, &variants);
-    for planned in plan.commands() {
-        planned.stage.check()?;
-    }
+pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
+    let settings = args.settings();
+    let variants = all_variants(&args.methods, &args.variants, args.ablations.is_some(), &args.only, settings.probes)?;
+    let evaluate = Evaluate {
+        scene: args.scene.clone(),
+        path: args.path.clone(),
+        output: args.output.clone(),
+        variants,
+        reference: args.reference.clone(),
+        probes: args.probes.clone(),
+        lightmap: args.lightmap.clone(),
+        curvature: args.curvature.clone(),
+        bakes: args.bakes.clone(),
+        bake_options: args.bake.clone(),
+        frames: args.frames.clone(),
+        settings,
+        exposure: args.exposure,
+        page_bytes: args.page_mb as usize * 1_000_000,
+    };
     if args.dry_run {
-        let lines: Vec<String> = plan.commands().map(|p| p.stage.command_line()).collect();
+        let plan = evaluate.plan(cx)?;
+        let lines: Vec<String> = plan.stages().map(|p| p.stage.command_line(&cx.with_seed(p.seed))).collect();
         return Ok(Outcome { summary: lines.join("\n"), figures: json!({ "commands": lines }), ..Outcome::default() });
     }
-    let world = common.opaque_world(&args.scene)?;
-    let views = views(common, &world.scene, Some(&args.path), size, args.frames.as_ref())?;
-    let frames: Vec<u32> = views.iter().map(|v| v.frame).collect();
-    let size = views[0].camera.size;
-    let folders: Vec<PathBuf> = variants.iter().map(|v| frames_folder(args, v)).collect();
-    let reference = reference_folder(args);
-    let page_bytes = args.page_mb as usize * 1_000_000;
-    let subjects =
-        Subjects { methods: &folders, reference: &reference, frames: &frames, size, exposure: args.exposure, page_bytes };
-    if args.reference.is_some() {
-        // Before hours of work.
-        layers(&subjects)?;
-    }
-
-    let costs = execute(args, common, &plan, &variants, &world.scene)?;
-    let layers = layers(&subjects)?;
-    let measured = measure(&subjects, &layers, common)?;
-    let mut provenance = Provenance::new("evaluate", &world.scene.hash, common.seed, &json!({ "exposure": args.exposure }));
-    for (variant, folder) in variants.iter().zip(&folders) {
-        provenance = provenance.with_input(&format!("frames/{}", variant.name), hash_frames(folder, &frames)?);
-    }
-    provenance = provenance.with_input("reference", hash_frames(&reference, &frames)?);
-    let methods = variants.iter().zip(measured.errors).map(|(v, layers)| MethodErrors {
-        name: v.name.clone(),
-        method: v.method_name(),
-        options: v.differences(),
-        ablation: v.ablation.clone(),
-        layers,
-    });
-    let evaluation = Evaluation {
-        scene: scene_name(&args.scene),
-        path: stem(&args.path),
-        size: size.map(|n| n as usize),
-        reference: args.reference.as_ref().map_or_else(
-            || format!("path-trace, {reference_spp} samples a pixel"),
-            |folder| format!("the frames of {}", folder.file_name().unwrap_or_default().to_string_lossy()),
-        ),
-        exposure: args.exposure,
-        frames: frames.iter().map(|f| format!("{f:04}")).collect(),
-        layers: layers.iter().map(|l| (*l).to_owned()).collect(),
-        methods: methods.collect(),
-        provenance,
-    };
-    atomic::write_json(&args.output.join("evaluation.json"), &evaluation)?;
-    atomic::write(&args.output.join("evaluation.md"), markdown(&evaluation, &costs).as_bytes())?;
-    let page = args.output.join("index.html");
-    atomic::write(&page, html(&evaluation, &costs, &measured.shown)?.as_bytes())?;
-    Ok(outcome(&evaluation, &costs, &page, began.elapsed().as_secs_f64()))
-}
-
-fn outcome(evaluation: &Evaluation, costs: &Costs, page: &Path, seconds: f64) -> Outcome {
-    let mut summary = String::new();
-    for layer in &evaluation.layers {
-        summary += &format!("{layer}: mean over {} frames\n", evaluation.frames.len());
-        for (method, errors) in evaluation.methods.iter().filter_map(|m| Some((m, m.layers.get(layer)?))) {
-            let m = errors.mean.metrics;
-            summary += &format!("  {:28} RMSE {:.4}  DSSIM {:.4}  FLIP {:.4}\n", method.name, m.rmse_rgb, m.dssim_rgb, m.flip);
-        }
-    }
-    let means =
-        |m: &MethodErrors| -> Value { m.layers.iter().map(|(layer, errors)| (layer.clone(), json!(errors.mean))).collect() };
-    let methods: Value = evaluation.methods.iter().map(|m| (m.name.clone(), means(m))).collect();
-    Outcome {
-        summary: format!("{summary}see {}\nDone in {seconds:.0} s.", page.display()),
-        figures: json!({ "methods": methods, "costs": costs, "seconds": seconds }),
-        ..Outcome::default()
-    }
-}
-
-fn hash_frames(folder: &Path, frames: &[u32]) -> anyhow::Result<String> {
-    let hashes: String = frames.iter().map(|&f| hash_file(&folder.join(file(f)))).collect::<Result<_, _>>()?;
-    Ok(blake3::hash(hashes.as_bytes()).to_hex().to_string())
-}
-
-fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// `staircase2` of staircase2/scene.xml.
-fn scene_name(path: &Path) -> String {
-    let folder = path.parent().and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
-    match folder {
-        Some(folder) if stem(path).starts_with("scene") => folder,
-        _ => stem(path),
-    }
+    Ok(evaluate.run(cx)?)
 }

@@ -1,9 +1,9 @@
 //! `reprobe info`.
 
-use crate::common::{Common, Outcome};
 use anyhow::Context;
 use reprobe::io::picture::pictures;
 use reprobe::io::{ExrImage, Samples, atomic};
+use reprobe::plan::Outcome;
 use serde_json::json;
 use std::fmt::Write;
 use std::io::Cursor;
@@ -25,7 +25,7 @@ pub struct Args {
     exposure: f32,
 }
 
-pub fn run(args: &Args, _common: &Common) -> anyhow::Result<Outcome> {
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let image = ExrImage::read(&args.file)?;
     let mut summary = format!("{}: {} x {}\n", args.file.display(), image.width, image.height);
     let mut channels = Vec::new();

@@ -1,30 +1,24 @@
-//! The command line: parses, calls the library, reports. Exit codes: 0 done, 1 a check failed, 2 bad usage or input.
+//! The command line: arguments become a stage, which the library runs; its result is reported. Exit codes: 0 done, 1 a check failed, 2 bad
+//! usage or input.
 
 mod bake_lightmap;
 mod bake_probes;
-mod budget;
 mod common;
 mod compare;
 mod curvature;
 mod devices;
 mod evaluate;
-mod frames;
 mod info;
-mod pipeline;
 mod place_probes;
-mod probe_set;
+mod preset;
 mod qhmap;
-mod render_baseline;
-mod render_glossy;
 mod render_path;
 mod resmap;
 mod run;
 
-mod timings;
-mod views;
-
 use clap::Parser;
-use common::{Common, Outcome};
+use common::Common;
+use reprobe::plan::{Context, Outcome, Stage};
 use std::process::ExitCode;
 
 /// Bakes glossy global illumination into light probes and reprojects it into new views.
@@ -54,9 +48,8 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let common = &cli.common;
-    let result = common.start().and_then(|()| dispatch(&cli.command, common));
+    let Cli { common, command } = Cli::parse();
+    let result = common.start().and_then(|()| common.context()).and_then(|cx| dispatch(command, &cx));
     match result {
         Ok(outcome) => {
             common.report(&outcome);
@@ -69,23 +62,62 @@ fn main() -> ExitCode {
     }
 }
 
-fn dispatch(command: &Command, common: &Common) -> anyhow::Result<Outcome> {
-    use Command::{BakeLightmap, BakeProbes, Devices, Evaluate, RenderPath, Resmap, Run};
-    if !matches!(command, Resmap(_) | BakeProbes(_) | BakeLightmap(_) | RenderPath(_) | Devices(_) | Run(_) | Evaluate(_)) {
-        common.refuse_gpu()?;
+fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
+    let stage: Stage = match command {
+        Command::PlaceProbes(args) => args.stage().into(),
+        Command::Resmap(args) => args.stage().into(),
+        Command::Qhmap(args) => args.stage().into(),
+        Command::Curvature(args) => args.stage().into(),
+        Command::BakeProbes(args) => args.stage().into(),
+        Command::BakeLightmap(args) => args.stage().into(),
+        Command::RenderPath(args) => args.stage().into(),
+        Command::Compare(args) => args.stage().into(),
+        Command::Devices(args) => return devices::run(&args),
+        Command::Info(args) => {
+            cx.refuse_gpu("info")?;
+            return info::run(&args);
+        }
+        Command::Run(args) => return run::run(&args, cx),
+        Command::Evaluate(args) => return evaluate::run(&args, cx),
+    };
+    if !stage.uses_gpu() {
+        cx.refuse_gpu(stage.command())?;
     }
-    match command {
-        Command::PlaceProbes(args) => place_probes::run(args, common),
-        Command::Resmap(args) => resmap::run(args, common),
-        Command::Qhmap(args) => qhmap::run(args, common),
-        Command::Curvature(args) => curvature::run(args, common),
-        Command::BakeProbes(args) => bake_probes::run(args, common),
-        Command::BakeLightmap(args) => bake_lightmap::run(args, common),
-        Command::RenderPath(args) => render_path::run(args, common),
-        Command::Compare(args) => compare::run(args, common),
-        Command::Devices(args) => devices::run(args, common),
-        Command::Info(args) => info::run(args, common),
-        Command::Run(args) => run::run(args, common),
-        Command::Evaluate(args) => evaluate::run(args, common),
+    Ok(stage.run(cx)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+    use reprobe::plan::stages::{BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
+
+    /// Every option of a stage can be typed, and what can be typed reaches the stage.
+    #[test]
+    fn stages_and_subcommands_have_the_same_options() {
+        let cli = Cli::command();
+        for (command, options) in [
+            (PlaceProbes::COMMAND, PlaceProbes::OPTIONS),
+            (Resmap::COMMAND, Resmap::OPTIONS),
+            (Qhmap::COMMAND, Qhmap::OPTIONS),
+            (Curvature::COMMAND, Curvature::OPTIONS),
+            (BakeLightmap::COMMAND, BakeLightmap::OPTIONS),
+            (BakeProbes::COMMAND, BakeProbes::OPTIONS),
+            (RenderPath::COMMAND, RenderPath::OPTIONS),
+            (Compare::COMMAND, Compare::OPTIONS),
+        ] {
+            let sub = cli.find_subcommand(command).unwrap_or_else(|| panic!("no subcommand {command}"));
+            let mut typed: Vec<String> = sub.get_arguments().filter_map(|a| Some(format!("--{}", a.get_long()?))).collect();
+            typed.retain(|option| option != "--help" && option != "--version");
+            typed.sort();
+            let mut known: Vec<&str> = options.to_vec();
+            known.sort_unstable();
+            assert_eq!(typed, known, "{command}");
+        }
+    }
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Cli::command().debug_assert();
     }
 }

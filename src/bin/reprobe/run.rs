@@ -1,13 +1,18 @@
 //! `reprobe run`: the whole pipeline, stage by stage, as the commands that a person would type.
 
-use crate::common::{Common, Outcome, parse_size};
-use crate::compare;
-use crate::pipeline::{Bakes, Pipeline, Preset, Settings, Stage};
-use crate::views::{FrameList, parse_frames};
+use crate::preset::Preset;
+use anyhow::ensure;
+use reprobe::base::clock::seconds;
 use reprobe::io::ExrImage;
+use reprobe::method::METHODS;
+use reprobe::plan::option::Size;
+use reprobe::plan::pipeline::{Bakes, Pipeline, execute, needed};
+use reprobe::plan::settings::Settings;
+use reprobe::plan::stages::{Compare, frame_names};
+use reprobe::plan::views::FrameList;
+use reprobe::plan::{Context, Outcome, Stage};
 use serde_json::json;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Run the whole pipeline: place, map, bake, render, compare
 ///
@@ -40,8 +45,8 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     probes: Option<u32>,
     /// Size of a probe, texels
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    probe_size: Option<[u32; 2]>,
+    #[arg(long, value_name = "WxH")]
+    probe_size: Option<Size>,
     /// Paths a probe texel
     #[arg(long, value_name = "N")]
     spp: Option<u32>,
@@ -52,10 +57,10 @@ pub struct Args {
     #[arg(long, value_name = "M")]
     texel: Option<f32>,
     /// Size of the frames
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<[u32; 2]>,
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
     /// Only these frames of the path
-    #[arg(long, value_name = "LIST", value_parser = parse_frames)]
+    #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
     /// Rays a pixel along one side
     #[arg(long, value_name = "N")]
@@ -87,16 +92,16 @@ fn comparisons(args: &Args) -> anyhow::Result<Vec<Comparison>> {
     }
     let mut list = vec![(None, "report", "whole frame"), (Some("glossy"), "report-glossy", "glossy layer")];
     if let Some(folder) = &args.reference {
-        let first = folder.join(&compare::frames(folder)?[0]);
+        let first = folder.join(&frame_names(folder)?[0]);
         let frame = ExrImage::read(&first)?;
         list.retain(|(layer, ..)| frame.rgb(&first, layer.unwrap_or("")).is_ok());
-        anyhow::ensure!(!list.is_empty(), "{}: found neither R, G, B nor glossy.R, glossy.G, glossy.B", first.display());
+        ensure!(!list.is_empty(), "{}: found neither R, G, B nor glossy.R, glossy.G, glossy.B", first.display());
     }
     Ok(list)
 }
 
 fn settings(args: &Args) -> Settings {
-    let preset = args.preset.settings(args.path.is_some());
+    let preset = reprobe::plan::settings::Preset::from(args.preset).settings(args.path.is_some());
     Settings {
         probes: args.probes.unwrap_or(preset.probes),
         probe_size: args.probe_size.unwrap_or(preset.probe_size),
@@ -112,54 +117,55 @@ fn settings(args: &Args) -> Settings {
     }
 }
 
-fn stages(args: &Args, common: &Common, comparisons: &[Comparison]) -> Vec<Stage> {
-    let settings = settings(args);
-    let all_texels = settings.all_texels;
-    let path = args.path.as_deref();
-    let pipeline = Pipeline { common, scene: &args.scene, path, frames: args.frames.as_ref(), settings };
+fn stages(args: &Args, comparisons: &[Comparison]) -> Vec<Stage> {
+    let (scene, path, frames) = (args.scene.clone(), args.path.clone(), args.frames.clone());
+    let pipeline = Pipeline { scene, path, frames, settings: settings(args) };
     let out = |name: &str| args.output.join(name);
-    let set = |s: Stage| args.set.iter().fold(s, |s, set| s.option("--set", set));
     let bakes = Bakes::within(&args.output);
-    let mut list = pipeline.bakes(&bakes);
-    if !all_texels {
-        list = list.into_iter().map(|s| if s.command() == "bake-probes" { set(s) } else { s }).collect();
+    let mut render = pipeline.render(METHODS[0], &bakes, &out("frames"));
+    render.set.extend(args.set.iter().cloned());
+    let render = Stage::from(render);
+    let mut list = needed(pipeline.bakes(&bakes), &render);
+    for stage in &mut list {
+        if let Stage::BakeProbes(bake) = stage
+            && bake.for_path.is_some()
+        {
+            bake.set.extend(args.set.iter().cloned());
+        }
     }
-    list.push(set(pipeline.render_from(&bakes, &out("frames"))));
+    list.push(render);
     if args.no_reference {
         return list;
     }
     let reference = args.reference.clone().unwrap_or_else(|| out("reference"));
     if args.reference.is_none() {
-        list.push(pipeline.reference(&reference));
+        list.push(pipeline.reference(&reference).into());
     }
     for (layer, report, _) in comparisons {
-        list.push(
-            Stage::new("compare")
-                .path(&out("frames"))
-                .path(&reference)
-                .optional("--layer", *layer)
-                .option("--output", out(report).display())
-                .flag("--quiet", common.quiet),
-        );
+        let layer = layer.map(str::to_owned);
+        let (image, reference, output) = (out("frames"), reference.clone(), out(report));
+        list.push(Compare { image, reference, layer, output, ..Compare::default() }.into());
     }
     list
 }
 
-pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
-    let began = Instant::now();
+pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
+    let clock = seconds();
     let comparisons = comparisons(args)?;
-    let stages = stages(args, common, &comparisons);
+    let stages = stages(args, &comparisons);
+    for stage in &stages {
+        stage.check()?;
+    }
     if args.dry_run {
-        let lines: Vec<String> = stages.iter().map(Stage::command_line).collect();
+        let lines: Vec<String> = stages.iter().map(|s| s.command_line(cx)).collect();
         return Ok(Outcome { summary: lines.join("\n"), figures: json!({ "commands": lines }), ..Outcome::default() });
     }
     let mut figures = Vec::new();
     for stage in &stages {
-        let outcome = stage.execute(common, "")?;
-        figures.push(json!({ "command": stage.command_line(), "figures": outcome.figures }));
+        let outcome = execute(stage, cx, "")?;
+        figures.push(json!({ "command": stage.command_line(cx), "figures": outcome.figures }));
     }
-    let out = args.output.display();
-    let seconds = began.elapsed().as_secs_f64();
+    let (out, seconds) = (args.output.display(), clock());
     let reports: Vec<String> =
         comparisons.iter().map(|(_, folder, what)| format!("{out}/{folder}/index.html ({what})")).collect();
     let report = if reports.is_empty() { String::new() } else { format!("\nReport: {}", reports.join(", ")) };

@@ -28,7 +28,7 @@ pub const PAPER_ROUGHNESS_SCALE: f32 = 0.5;
 /// Parameters of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BakeParams {
+pub struct ProbeBakeParams {
     /// Paths a texel; the most, where `error` is given. *Paper* (§7): 2048.
     pub spp: u32,
     /// Standard error at which a texel is done, in units of its luminance plus [`ERROR_FLOOR`]; `None` gives each `spp` paths. *Ours*.
@@ -43,20 +43,20 @@ pub struct BakeParams {
     pub spread: bool,
 }
 
-impl Default for BakeParams {
+impl Default for ProbeBakeParams {
     fn default() -> Self {
         Self { spp: 2048, error: None, roughness_scale: 1.0, spread: false }
     }
 }
 
-impl BakeParams {
+impl ProbeBakeParams {
     /// What the paths of a texel are followed for.
     pub fn query(&self) -> Query {
         Query { lobes: Lobes::NON_DIFFUSE, roughness_scale: self.roughness_scale }
     }
 }
 
-impl Parameters for BakeParams {
+impl Parameters for ProbeBakeParams {
     fn validate(&self) -> Result<()> {
         within("spp", self.spp, 1..=1 << 24)?;
         self.error.map_or(Ok(()), |e| within("error", e, f32::MIN_POSITIVE..=1e9))?;
@@ -99,12 +99,12 @@ pub struct Bake<'a> {
     /// The scene.
     pub world: &'a World,
     /// Parameters.
-    pub params: &'a BakeParams,
+    pub params: &'a ProbeBakeParams,
     /// Seed of all random numbers.
     pub seed: u32,
     /// Diffuse light of the scene, read where a path leaves the glossy chain. *Ours*: the paper traces on.
     pub lightmap: Option<&'a LightMap>,
-    /// Where the paths are followed, made for [`BakeParams::query`] and [`PathParams::default`]; `None` for the CPU.
+    /// Where the paths are followed, made for [`ProbeBakeParams::query`] and [`PathParams::default`]; `None` for the CPU.
     pub device: Option<&'a dyn Follow>,
 }
 

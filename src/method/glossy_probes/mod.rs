@@ -23,8 +23,11 @@ pub mod qhmap;
 pub mod quasi_harmonic;
 pub mod renderer;
 pub mod resmap;
+mod row;
 pub mod seen;
 pub mod wanted;
+
+pub use row::{METHOD, resolve};
 
 use crate::Result;
 use crate::base::named::{Parameters, within};

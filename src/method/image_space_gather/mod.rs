@@ -14,6 +14,9 @@
 //! In: a view's G-buffer. Out: its glossy layer, linear radiance.
 
 pub mod gpu;
+mod row;
+
+pub use row::METHOD;
 
 use crate::Result;
 use crate::base::math::{Rgb, hash_words, unit};

@@ -8,6 +8,9 @@
 //! In: a view's G-buffer. Out: its glossy layer, linear radiance; unbiased but for the light map and the end of the chain.
 
 pub mod gpu;
+mod row;
+
+pub use row::METHOD;
 
 use crate::Result;
 use crate::base::math::{Rgb, hash_words};

@@ -9,7 +9,9 @@
 //!
 //! In: layers and their guides, linear. Out: layers.
 
+use crate::Result;
 use crate::base::math::{Rgb, hash_words, luminance};
+use crate::base::named::{Parameters, within};
 use crate::material::Surface;
 use crate::material::bsdf::Lobes;
 use crate::scene::Camera;
@@ -66,6 +68,18 @@ impl Default for DenoiseParams {
             mirror_alpha: 0.02,
             despeckle: 2,
         }
+    }
+}
+
+impl Parameters for DenoiseParams {
+    fn validate(&self) -> Result<()> {
+        within("levels", self.levels, 0..=MOST_LEVELS)?;
+        within("luminance_sigma", self.luminance_sigma, 0.0..=1e9)?;
+        within("normal_power", self.normal_power, 0.0..=1e9)?;
+        within("depth_sigma", self.depth_sigma, 0.0..=1e9)?;
+        within("albedo_sigma", self.albedo_sigma, 0.0..=1e9)?;
+        within("mirror_alpha", self.mirror_alpha, 0.0..=1.0)?;
+        within("despeckle", self.despeckle, 0..=NEIGHBOURS)
     }
 }
 

@@ -6,6 +6,9 @@
 pub mod denoise;
 pub mod denoise_gpu;
 pub mod gpu;
+mod row;
+
+pub use row::METHOD;
 
 use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;

@@ -119,6 +119,11 @@ impl Ulr {
         self.gpu.adapter.timestamps
     }
 
+    /// Bytes of the probes on the device.
+    pub fn probe_bytes(&self) -> u64 {
+        self.resident.bytes()
+    }
+
     /// Makes room for frames of `size` and for at least one probe of so many texels. An error where memory does not suffice.
     pub fn reserve(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<()> {
         self.target = Some(self.reserved(size, probe)?);

@@ -17,6 +17,9 @@
 //! In: a view's G-buffer, and probes. Out: its glossy layer, linear radiance.
 
 pub mod gpu;
+mod row;
+
+pub use row::METHOD;
 
 use crate::Result;
 use crate::base::math::{Rgb, floor, fraction};

@@ -1,27 +1,47 @@
 //! Equal time (§7.3: "same frame rate for each method"): the sample count with which a method takes as long a frame as it may.
 
-use crate::common::Common;
-use crate::render_path::Args;
-use crate::timings::{Timings, frame_ms};
-use anyhow::{Context, bail};
-use reprobe::io::atomic;
+use super::Context;
+use super::timings::frame_ms;
+use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Milliseconds a frame that `--budget-ms` gives, or the other method that `--match-time` names took; `None` without either.
-pub fn budget_ms(args: &Args, common: &Common) -> anyhow::Result<Option<f64>> {
-    let budget = match &args.match_time {
-        Some(folder) => Some(read(folder, common)?),
-        None => args.budget_ms,
-    };
-    match budget {
-        Some(ms) if !(ms.is_finite() && ms > 0.0) => bail!("a budget of {ms} ms a frame: expected a positive number"),
-        _ => Ok(budget),
+/// Largest sample count that a budget may choose.
+const MOST_SAMPLES: u32 = 1 << 16;
+
+/// How long a frame may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Budget {
+    /// Milliseconds.
+    pub ms: f64,
+}
+
+/// An error for a number of milliseconds that is none.
+pub fn check(ms: Option<f64>) -> Result<()> {
+    match ms {
+        Some(ms) if !(ms.is_finite() && ms > 0.0) => {
+            Err(Error::Request(format!("a budget of {ms} ms a frame: expected a positive number")))
+        }
+        _ => Ok(()),
+    }
+}
+
+impl Budget {
+    /// `ms`, or what the frames of another run took; `None` without either.
+    pub fn read(ms: Option<f64>, match_time: Option<&Path>, cx: &Context) -> Result<Option<Self>> {
+        check(ms)?;
+        let matched = match_time.map(|folder| mean_ms(folder, cx)).transpose()?;
+        Ok(ms.or(matched).map(|ms| Self { ms }))
+    }
+
+    /// The sample count whose frames take about so long, given the time that a count takes.
+    pub fn choose(&self, time: &mut dyn FnMut(u32) -> Result<f64>) -> Result<u32> {
+        choose(self.ms, MOST_SAMPLES, time)
     }
 }
 
 /// The mean time of another run's frames.
-fn read(folder: &Path, common: &Common) -> anyhow::Result<f64> {
+fn mean_ms(folder: &Path, cx: &Context) -> Result<f64> {
     #[derive(serde::Deserialize)]
     struct Other {
         threads: usize,
@@ -29,22 +49,22 @@ fn read(folder: &Path, common: &Common) -> anyhow::Result<f64> {
     }
     let path = folder.join("timings.json");
     let text =
-        std::fs::read_to_string(&path).with_context(|| format!("{}: --match-time needs a folder of frames", path.display()))?;
-    let other: Other = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+        std::fs::read_to_string(&path).map_err(|e| Error::input(&path, format!("{e}: --match-time needs a folder of frames")))?;
+    let other: Other = serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
     let threads = rayon::current_num_threads();
-    if other.threads != threads && !common.quiet {
-        eprintln!("reprobe: warning: {}: timed with {} threads; this run has {threads}", path.display(), other.threads);
+    if other.threads != threads {
+        cx.listener.warn(&format!("{}: timed with {} threads; this run has {threads}", path.display(), other.threads));
     }
     let ms = frame_ms(&other.mean_ms);
     if ms <= 0.0 {
-        bail!("{}: that run kept all its frames and timed none; render them again", path.display());
+        return Err(Error::input(&path, "that run kept all its frames and timed none; render them again"));
     }
     Ok(ms)
 }
 
 /// The count from 1 to `most` whose frame time comes nearest `budget` milliseconds, given the time that a count takes, about a
 /// constant and a share a sample. Measures at three counts at the most.
-pub fn choose(budget: f64, most: u32, time: &mut dyn FnMut(u32) -> anyhow::Result<f64>) -> anyhow::Result<u32> {
+fn choose(budget: f64, most: u32, time: &mut dyn FnMut(u32) -> Result<f64>) -> Result<u32> {
     let clamp = |n: f64| n.round().clamp(1.0, f64::from(most)) as u32;
     // The first run also warms the caches.
     time(1)?;
@@ -66,11 +86,6 @@ pub fn choose(budget: f64, most: u32, time: &mut dyn FnMut(u32) -> anyhow::Resul
         }
     }
     Ok(count)
-}
-
-/// Writes down what was chosen before the frames are rendered with it, so that a run that is stopped can be repeated.
-pub fn record(timings: &Timings, output: &Path) -> anyhow::Result<()> {
-    Ok(atomic::write_json(&output.join("timings.json"), timings)?)
 }
 
 #[cfg(test)]

@@ -1,20 +1,22 @@
-//! `--variant NAME=METHOD,...`: a method with other parameters, other options or other bakes.
+//! `NAME=METHOD,...`: a method with other parameters, other options or other bakes.
 
-use crate::render_path::Method;
-use crate::set_params::split;
-use clap::ValueEnum;
-use reprobe::metric::evaluation::Ablation;
+use super::Stage;
+use super::stage::BAKES;
+use crate::base::named::split;
+use crate::method::Method;
+use crate::metric::evaluation::Ablation;
+use crate::{Error, Result};
 
 /// An option of a command, and its value where it has one.
 pub type Given = (String, Option<String>);
 
 /// A method to evaluate.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone)]
 pub struct Variant {
     /// Its name in the tables, and that of the folder of its frames.
     pub name: String,
     /// `--method`.
-    pub method: Method,
+    pub method: &'static Method,
     /// Options of `render-path`.
     pub options: Vec<Given>,
     /// Parameters of its passes, as `--set` takes them.
@@ -25,24 +27,17 @@ pub struct Variant {
     pub ablation: Option<Ablation>,
 }
 
-/// The stages whose options a variant may change, in the order in which they run.
-pub const STAGES: [&str; 6] = ["place-probes", "resmap", "qhmap", "curvature", "bake-lightmap", "bake-probes"];
-
 impl Variant {
     /// A method as it is.
-    pub fn plain(name: &str) -> Result<Self, String> {
-        let method = Method::from_str(name, false).map_err(|_| {
-            let known: Vec<String> =
-                Method::value_variants().iter().filter_map(|m| Some(m.to_possible_value()?.get_name().to_owned())).collect();
-            format!("no method \"{name}\"; there are {}", known.join(", "))
-        })?;
+    pub fn plain(name: &str) -> std::result::Result<Self, String> {
+        let method = Method::find(name).map_err(|e| e.to_string())?;
         let (options, sets, bakes) = (Vec::new(), Vec::new(), Vec::new());
         Ok(Self { name: name.into(), method, options, sets, bakes, ablation: None })
     }
 
     /// Parses `NAME=METHOD,WHAT,...`, where each WHAT is an option of `render-path` (`--spp=4`), an option of a stage
     /// (`bake-probes:--spp=64`) or a parameter of a pass (`gather.probes=1`).
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub fn parse(text: &str) -> std::result::Result<Self, String> {
         let (name, rest) = text.split_once('=').ok_or("expected NAME=METHOD,... like one=glossy-probes,gather.probes=1")?;
         let usable = |c: char| c.is_ascii_alphanumeric() || "-_.+".contains(c);
         if name.is_empty() || name.starts_with('.') || !name.chars().all(usable) {
@@ -56,7 +51,7 @@ impl Variant {
         Ok(variant)
     }
 
-    fn add(&mut self, part: &str) -> Result<(), String> {
+    fn add(&mut self, part: &str) -> std::result::Result<(), String> {
         if part.starts_with("--") {
             self.options.push(given(part));
         } else if part.contains(":--") {
@@ -69,14 +64,14 @@ impl Variant {
         Ok(())
     }
 
-    /// `--method`.
-    pub fn method_name(&self) -> String {
-        self.method.to_possible_value().map_or_else(String::new, |v| v.get_name().into())
-    }
-
     /// The value of an option of `render-path`.
     pub fn option(&self, name: &str) -> Option<&str> {
         self.options.iter().find(|(n, _)| n == name)?.1.as_deref()
+    }
+
+    /// Gives `stage` those options that are the variant's own for it.
+    pub fn configure(&self, stage: &mut Stage) -> Result<()> {
+        configure(stage, &self.bakes)
     }
 
     /// What differs from the method's defaults, for people.
@@ -87,6 +82,15 @@ impl Variant {
     }
 }
 
+/// Gives `stage` those of `options` that are meant for it.
+pub fn configure(stage: &mut Stage, options: &[(String, Given)]) -> Result<()> {
+    let command = stage.command();
+    for (_, (option, value)) in options.iter().filter(|(name, _)| name == command) {
+        stage.set(option, value.as_deref()).map_err(|e| Error::Request(format!("{command}:{option}: {e}")))?;
+    }
+    Ok(())
+}
+
 fn given(text: &str) -> Given {
     match text.split_once('=') {
         Some((name, value)) => (name.into(), Some(value.into())),
@@ -95,18 +99,11 @@ fn given(text: &str) -> Given {
 }
 
 /// Parses `STAGE:--OPTION=VALUE`.
-pub fn parse_bake(text: &str) -> Result<(String, Given), String> {
+pub fn parse_bake(text: &str) -> std::result::Result<(String, Given), String> {
     match text.split_once(':') {
-        Some((stage, option)) if STAGES.contains(&stage) && option.starts_with("--") => Ok((stage.into(), given(option))),
-        _ => Err(format!("\"{text}\": expected STAGE:--OPTION=VALUE, the stage one of {}", STAGES.join(", "))),
+        Some((stage, option)) if BAKES.contains(&stage) && option.starts_with("--") => Ok((stage.into(), given(option))),
+        _ => Err(format!("\"{text}\": expected STAGE:--OPTION=VALUE, the stage one of {}", BAKES.join(", "))),
     }
-}
-
-/// Experiments that are known by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Ablations {
-    /// Figures 12 to 15 of Rodriguez et al. 2020
-    Paper,
 }
 
 /// Name of the whole method, which the ablations are compared with.
@@ -116,7 +113,7 @@ pub const WHOLE: &str = "glossy-probes";
 ///
 /// As in the paper, Figures 12 and 13 are of probes of half roughness, without the filter; every pixel is then searched for in full, as the paper does, since a pixel
 /// that begins where its neighbour ended searches further than its own window.
-pub fn paper(probes: u32) -> Result<Vec<Variant>, String> {
+pub fn paper_ablations(probes: u32) -> std::result::Result<Vec<Variant>, String> {
     let half = format!("place-probes:--count={}", (probes / 2).max(1));
     let double = format!("place-probes:--count={}", 2 * probes);
     let unfiltered = "footprint=null,gather.anchors=1,bake-probes:--roughness-scale=0.5";
@@ -186,8 +183,8 @@ pub fn paper(probes: u32) -> Result<Vec<Variant>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::set_params::apply;
-    use reprobe::method::glossy_probes::GlossyProbeParams;
+    use crate::base::named::apply;
+    use crate::method::glossy_probes::GlossyProbeParams;
 
     #[test]
     fn a_variant_tells_options_of_frames_and_bakes_and_parameters_apart() {
@@ -204,14 +201,14 @@ mod tests {
             ("x=glossy-probes,fast", "\"fast\": expected"),
             ("x=glossy-probes,compare:--layer=glossy", "the stage one of"),
         ] {
-            let message = Variant::parse(text).unwrap_err();
+            let message = Variant::parse(text).err().unwrap();
             assert!(message.contains(expected), "{text}: {message}");
         }
     }
 
     #[test]
     fn the_papers_ablations_are_compared_with_one_another_and_change_what_there_is() {
-        let variants = paper(64).unwrap();
+        let variants = paper_ablations(64).unwrap();
         for v in &variants {
             let against = &v.ablation.as_ref().unwrap().against;
             assert!(against == WHOLE || variants.iter().any(|w| w.name == *against), "{}: {against}", v.name);

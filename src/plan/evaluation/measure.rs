@@ -1,15 +1,14 @@
 //! Measures all frames of all methods, and makes the pictures of those that the page shows.
 
-use crate::common::Common;
-use crate::compare::read_pair;
-use anyhow::{Context, bail};
+use crate::base::progress::Progress;
+use crate::io::ExrImage;
+use crate::metric::evaluation::{FrameErrors, LayerErrors, Pictures, Shown, jpeg_gray, jpeg_rgb};
+use crate::metric::flip::to_rgb8;
+use crate::metric::temporal::{change, signed_error};
+use crate::metric::{compare, display};
+use crate::plan::stages::read_pair;
+use crate::{Error, Result};
 use rayon::prelude::*;
-use reprobe::base::progress::Progress;
-use reprobe::io::ExrImage;
-use reprobe::metric::evaluation::{FrameErrors, LayerErrors, Pictures, Shown, jpeg_gray, jpeg_rgb};
-use reprobe::metric::flip::to_rgb8;
-use reprobe::metric::temporal::{change, signed_error};
-use reprobe::metric::{compare, display};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -38,26 +37,26 @@ pub struct Measured {
 }
 
 /// The layers that the references have, glossy first.
-pub fn layers(subjects: &Subjects) -> anyhow::Result<Vec<&'static str>> {
+pub fn layers(subjects: &Subjects) -> Result<Vec<&'static str>> {
     for &frame in subjects.frames {
         let path = subjects.reference.join(file(frame));
         if !path.is_file() {
-            bail!(
-                "{}: no such file; the reference needs every frame that is evaluated ({})",
-                path.display(),
-                subjects.frames.len()
-            );
+            let message = format!("no such file; the reference needs every frame that is evaluated ({})", subjects.frames.len());
+            return Err(Error::input(&path, message));
         }
     }
     let path = subjects.reference.join(file(subjects.frames[0]));
     let image = ExrImage::read(&path)?;
     let [w, h] = subjects.size;
     if [image.width, image.height] != [w as usize, h as usize] {
-        bail!("{} has {} x {} pixels, the frames {w} x {h}: give --size", path.display(), image.width, image.height);
+        let message = format!("has {} x {} pixels, the frames {w} x {h}: give --size", image.width, image.height);
+        return Err(Error::input(&path, message));
     }
     let has = |layer: &&str| image.rgb(&path, if *layer == "full" { "" } else { layer }).is_ok();
     let layers: Vec<_> = ["glossy", "full"].into_iter().filter(has).collect();
-    anyhow::ensure!(!layers.is_empty(), "{}: found neither R, G, B nor glossy.R, glossy.G, glossy.B", path.display());
+    if layers.is_empty() {
+        return Err(Error::input(&path, "found neither R, G, B nor glossy.R, glossy.G, glossy.B"));
+    }
     Ok(layers)
 }
 
@@ -70,7 +69,7 @@ pub fn file(frame: u32) -> String {
 type Pair = [Vec<u8>; 2];
 
 /// Measures everything.
-pub fn measure(subjects: &Subjects, layers: &[&str], common: &Common) -> anyhow::Result<Measured> {
+pub fn measure(subjects: &Subjects, layers: &[&str], bar: &dyn Progress) -> Result<Measured> {
     let count = subjects.frames.len();
     let jobs: Vec<(usize, usize, usize)> = (0..layers.len())
         .flat_map(|layer| (0..subjects.methods.len()).flat_map(move |method| (0..count).map(move |frame| (layer, method, frame))))
@@ -79,14 +78,13 @@ pub fn measure(subjects: &Subjects, layers: &[&str], common: &Common) -> anyhow:
         .par_iter()
         .filter(|job| job.2 == count / 2)
         .map(|&job| {
-            anyhow::Ok(measure_frame(subjects, layers, job, true)?.1.map_or(0, |[picture, map]| picture.len() + map.len()))
+            Ok::<_, Error>(measure_frame(subjects, layers, job, true)?.1.map_or(0, |[picture, map]| picture.len() + map.len()))
         })
-        .collect::<anyhow::Result<_>>()?;
+        .collect::<Result<_>>()?;
     // The reference's pictures, and what base64 adds.
     let a_frame = (sizes.iter().sum::<usize>() + sizes.iter().max().unwrap_or(&0) * layers.len()) * 4 / 3;
     let every = (count * a_frame).div_ceil(subjects.page_bytes.max(1)).max(1);
 
-    let bar = common.progress();
     bar.start("measure", jobs.len() as u64);
     let results: Vec<(FrameErrors, Option<Pair>)> = jobs
         .par_iter()
@@ -95,7 +93,7 @@ pub fn measure(subjects: &Subjects, layers: &[&str], common: &Common) -> anyhow:
             bar.advance(1);
             result
         })
-        .collect::<anyhow::Result<_>>()?;
+        .collect::<Result<_>>()?;
     bar.finish();
 
     let mut errors = vec![BTreeMap::new(); subjects.methods.len()];
@@ -130,13 +128,13 @@ fn measure_frame(
     layers: &[&str],
     (layer, method, frame): (usize, usize, usize),
     draw: bool,
-) -> anyhow::Result<(FrameErrors, Option<Pair>)> {
+) -> Result<(FrameErrors, Option<Pair>)> {
     let read = |number: u32| {
         let name = file(number);
         read_pair(&subjects.methods[method].join(&name), &subjects.reference.join(&name), layers[layer])
     };
     let number = subjects.frames[frame];
-    let [image, reference] = read(number).with_context(|| format!("layer {}", layers[layer]))?;
+    let [image, reference] = read(number).map_err(|e| Error::Request(format!("layer {}: {e}", layers[layer])))?;
     let comparison = compare(&image, &reference, subjects.exposure);
     let change = match frame.checked_sub(1).map(|before| subjects.frames[before]).filter(|before| before + 1 == number) {
         Some(before) => {
@@ -147,7 +145,7 @@ fn measure_frame(
     };
     let size = image.size;
     let pictures = draw
-        .then(|| anyhow::Ok([jpeg_rgb(&to_rgb8(&comparison.display[0]), size)?, jpeg_gray(&comparison.maps.flip, size)?]))
+        .then(|| Ok::<_, Error>([jpeg_rgb(&to_rgb8(&comparison.display[0]), size)?, jpeg_gray(&comparison.maps.flip, size)?]))
         .transpose()?;
     Ok((FrameErrors { metrics: comparison.metrics, change }, pictures))
 }

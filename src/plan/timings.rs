@@ -1,9 +1,9 @@
 //! `timings.json`: milliseconds a pass and frame, and memory. Kept apart from the frames, whose bits must not depend on it.
 
+use crate::base::clock::timed;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 /// What a run took.
 #[derive(Serialize, Deserialize, Default)]
@@ -52,6 +52,17 @@ pub struct FrameTimings {
 }
 
 impl Timings {
+    /// Of a method, on the CPU, with nothing timed as yet.
+    pub fn of(method: &str) -> Self {
+        Self { method: method.into(), threads: rayon::current_num_threads(), clock: "cpu".into(), ..Self::default() }
+    }
+
+    /// Notes the bytes that probes take, in the host's memory and on the GPU, where they are the most so far.
+    pub fn note_probes(&mut self, [host, gpu]: [u64; 2]) {
+        self.probe_memory_bytes = self.probe_memory_bytes.max(host);
+        self.gpu_probe_memory_bytes = self.gpu_probe_memory_bytes.max(gpu);
+    }
+
     /// Notes the GPU that frames are made on, and whether its own clock times their passes.
     pub fn on_gpu(&mut self, device: &str, has_clock: bool) {
         self.device = Some(device.to_owned());
@@ -104,29 +115,12 @@ impl FrameTimings {
         self.passes_ms.extend(passes.iter().map(|&(pass, ms)| (pass.into(), ms)));
     }
 
-    /// Notes how many sub-pixels of a frame of `size`, so many along a pixel's side, nothing served.
-    pub fn unserved(&mut self, count: usize, size: [u32; 2], supersample: u32) {
-        let sub_pixels = size.iter().map(|&s| f64::from(s * supersample)).product::<f64>();
-        self.unserved_fraction = Some(count as f64 / sub_pixels);
-    }
-
     /// Runs a pass and notes its time.
     pub fn pass<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
         let (result, ms) = timed(work);
         self.passes_ms.insert(name.into(), ms);
         result
     }
-}
-
-/// The result of `work` and its milliseconds.
-pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
-    let start = Instant::now();
-    let result = work();
-    (result, milliseconds(start.elapsed()))
-}
-
-fn milliseconds(d: Duration) -> f64 {
-    (d.as_secs_f64() * 1e6).round() / 1e3
 }
 
 /// High-water mark of the resident set, from Linux's `/proc`.

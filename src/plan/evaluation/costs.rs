@@ -1,33 +1,34 @@
 //! Runs the commands of an evaluation, and notes what they took.
 
-use super::Args;
+use super::Evaluate;
 use super::plan::{Plan, Planned};
-use super::variant::Variant;
-use crate::common::Common;
-use crate::timings::{Timings, frame_ms, is_rendering};
-use reprobe::io::atomic;
-use reprobe::metric::evaluation::{Costs, MethodCost, ProbeCost, StageCost};
-use reprobe::probe::store::ProbeStore;
-use reprobe::scene::Scene;
+use crate::Result;
+use crate::base::clock::seconds;
+use crate::io::atomic;
+use crate::method::glossy_probes::wanted::Views;
+use crate::metric::evaluation::{Costs, MethodCost, ProbeCost, StageCost};
+use crate::plan::timings::{Timings, frame_ms, is_rendering};
+use crate::plan::{Context, pipeline};
+use crate::probe::store::ProbeStore;
+use crate::scene::Scene;
 use serde_json::Value;
 use std::path::Path;
-use std::time::Instant;
 
-/// Runs all commands; what they took is added to what earlier runs have noted in `timings.json`.
-pub fn execute(args: &Args, common: &Common, plan: &Plan, variants: &[Variant], scene: &Scene) -> anyhow::Result<Costs> {
-    let file = args.output.join("timings.json");
+/// Runs all stages; what they took is added to what earlier runs have noted in `timings.json`.
+pub fn execute(of: &Evaluate, cx: &Context, plan: &Plan, scene: &Scene) -> Result<Costs> {
+    let file = of.output.join("timings.json");
     let earlier: Costs = std::fs::read_to_string(&file).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
-    let total = plan.commands().count();
+    let total = plan.stages().count();
     let mut costs = Costs::default();
-    for (i, Planned { stage, users, .. }) in plan.commands().enumerate() {
-        let clock = Instant::now();
-        let outcome = stage.execute(common, &format!("[{} of {total}] ", i + 1))?;
-        let took = clock.elapsed().as_secs_f64();
-        let command = stage.command_line();
+    for (i, Planned { stage, seed, users }) in plan.stages().enumerate() {
+        let clock = seconds();
+        let cx = cx.with_seed(*seed);
+        let outcome = pipeline::execute(stage, &cx, &format!("[{} of {total}] ", i + 1))?;
+        let (took, command) = (clock(), stage.command_line(&cx));
         let before = earlier.stages.iter().find(|s| s.command == command).and_then(|s| s.seconds);
         let seconds = if was_there(&outcome.figures) { before } else { Some(before.unwrap_or(0.0).max(took)) };
         if i < plan.bakes.len() {
-            let methods = users.iter().map(|&u| variants[u].name.clone()).collect();
+            let methods = users.iter().map(|&u| of.variants[u].name.clone()).collect();
             costs.stages.push(StageCost { command, stage: stage.command().into(), methods, seconds });
             // Noted at once, as the next stage may take hours.
             let mut noted = Costs { methods: earlier.methods.clone(), ..costs.clone() };
@@ -36,8 +37,9 @@ pub fn execute(args: &Args, common: &Common, plan: &Plan, variants: &[Variant], 
             atomic::write_json(&file, &noted)?;
         }
     }
-    for (variant, (planned, probes)) in variants.iter().zip(plan.frames.iter().zip(&plan.probes)) {
-        let cost = method_cost(&planned.output, probes.as_deref(), &variant.name, &costs, scene);
+    for (i, (variant, planned)) in of.variants.iter().zip(&plan.frames).enumerate() {
+        let probes = plan.probes(i).map(std::path::PathBuf::as_path);
+        let cost = method_cost(planned.stage.output(), probes, &variant.name, &costs, scene);
         costs.methods.insert(variant.name.clone(), cost);
     }
     atomic::write_json(&file, &costs)?;
@@ -63,7 +65,7 @@ fn method_cost(frames: &Path, probes: Option<&Path>, name: &str, costs: &Costs, 
 
 /// What a set of probes holds; `None` for a folder of something else.
 fn probe_cost(folder: &Path, scene: &Scene) -> Option<ProbeCost> {
-    let mut store = ProbeStore::open(folder, scene, 8).ok()?;
+    let mut store = ProbeStore::<Views>::open(folder, scene, 8).ok()?;
     let baked: Vec<usize> = (0..store.set.files.len()).filter(|&i| !store.set.files[i].is_empty()).collect();
     let one = store.probe(*baked.first()?).ok()?.bytes();
     let count = store.set.grid.len() - store.set.grid.blocked.len();

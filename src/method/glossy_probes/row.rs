@@ -1,0 +1,140 @@
+//! Glossy probe reprojection in the table of methods.
+
+use super::GlossyProbeParams;
+use super::gpu::Renderer as OnGpu;
+use super::inspect::with_passes;
+use super::renderer::{Frame as Reprojected, Renderer as OnCpu};
+use super::wanted::Views;
+use crate::base::named::{apply, tree};
+use crate::base::progress::Progress;
+use crate::gpu::Gpu;
+use crate::io::ExrImage;
+use crate::method::{Frame, Method, Need, Options, Picture, Probes, Reads, Renderer, Setup};
+use crate::probe::store::ProbeStore;
+use crate::scene::Camera;
+use crate::surface::CurvatureMap;
+use crate::view::View;
+use crate::view::layers::LayerImages;
+use crate::{Error, Result};
+use serde_json::Value;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Probes kept in memory: the eight of one camera, and those of the cells around it.
+const PROBE_CACHE: usize = 32;
+
+/// The row.
+pub const METHOD: Method = Method {
+    name: "glossy-probes",
+    about: "Glossy probes, reprojected",
+    reads: Reads {
+        probes: Some(Probes { stage: "bake-probes", any_texel: false }),
+        lightmap: Need::Wanted,
+        curvature: Need::Required,
+    },
+    layers: &["glossy"],
+    options: &["probes", "lightmap", "curvature", "supersample", "gpu-memory", "paper", "set"],
+    samples: None,
+    transmissive: false,
+    sequential: true,
+    parameters,
+    cpu,
+    gpu: Some(gpu),
+};
+
+/// What the options come to.
+pub fn resolve(options: &Options) -> Result<GlossyProbeParams> {
+    let base = if options.paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() };
+    let supersample = options.supersample.unwrap_or(base.supersample);
+    apply(&GlossyProbeParams { supersample, ..base }, &options.set)
+}
+
+fn parameters(options: &Options) -> Result<Value> {
+    tree(&resolve(options)?)
+}
+
+/// The curvatures, and the probes of a set that serves the views.
+fn inputs<'a>(setup: &Setup<'a>, params: &GlossyProbeParams) -> Result<(&'a CurvatureMap, ProbeStore<Views>)> {
+    let curvature =
+        setup.curvature.ok_or_else(|| Error::Request("curvatures are needed: --curvature FILE, written by curvature".into()))?;
+    let folder = setup.required_probes()?;
+    let probes = ProbeStore::<Views>::open(&folder, &setup.world.scene, PROBE_CACHE)?;
+    check_serves(&folder, &probes, setup.views, params)?;
+    Ok((curvature, probes))
+}
+
+/// An error where a set lacks texels that the views ask for.
+fn check_serves(folder: &Path, probes: &ProbeStore<Views>, views: &[View], params: &GlossyProbeParams) -> Result<()> {
+    let cameras: Vec<Camera> = views.iter().map(|v| v.camera.clone()).collect();
+    let needed = Views::new(&cameras, params.supersample, &params.gather);
+    if probes.set.views.as_ref().is_none_or(|views| views.serve(&needed)) {
+        return Ok(());
+    }
+    let message = "its texels were baked for other views (another path, size, --supersample or gather parameters); \
+                   run bake-probes again for these, or without --for-path";
+    Err(Error::input(folder, message))
+}
+
+/// Either renderer, with its probes.
+struct WithProbes<R> {
+    renderer: R,
+    probes: ProbeStore<Views>,
+    supersample: u32,
+}
+
+impl<R> WithProbes<R> {
+    fn frame(&self, frame: Reprojected, view: &View) -> Frame {
+        let Reprojected { emission, diffuse, glossy, passes, unserved, buffers } = frame;
+        let [width, height] = view.camera.size.map(|n| n as usize);
+        let inspected = buffers.map(|buffers| with_passes(ExrImage::new(width, height), &buffers, self.supersample));
+        let layers = LayerImages { emission, diffuse, glossy };
+        Frame { picture: Picture::Layers(layers), passes, unserved: Some(unserved), inspected }
+    }
+}
+
+fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let params: GlossyProbeParams = setup.parameters()?;
+    let (curvature, probes) = inputs(setup, &params)?;
+    let supersample = params.supersample;
+    let mut renderer = OnCpu::new(setup.world, curvature, setup.lightmap, params, probes.set.roughness_scale);
+    renderer.inspect = setup.inspect;
+    Ok(Box::new(WithProbes { renderer, probes, supersample }))
+}
+
+impl Renderer for WithProbes<OnCpu<'_>> {
+    fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
+        let frame = self.renderer.frame(&view.camera, &mut self.probes)?;
+        progress.advance(view.camera.size[1].into());
+        Ok(WithProbes::frame(self, frame, view))
+    }
+
+    fn probe_bytes(&self) -> [u64; 2] {
+        [self.probes.resident_bytes() as u64, 0]
+    }
+}
+
+fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let params: GlossyProbeParams = setup.parameters()?;
+    let (curvature, probes) = inputs(setup, &params)?;
+    let (supersample, scale) = (params.supersample, probes.set.roughness_scale);
+    let mut renderer = OnGpu::new(gpu, setup.world, curvature, setup.lightmap, params, scale, setup.gpu_memory)?;
+    renderer.reserve(View::largest(setup.views), probes.set.size)?;
+    renderer.inspect = setup.inspect;
+    Ok(Box::new(WithProbes { renderer, probes, supersample }))
+}
+
+impl Renderer for WithProbes<OnGpu<'_>> {
+    fn frame(&mut self, view: &View, next: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
+        let frame = self.renderer.frame(&view.camera, next.map(|v| &v.camera), &mut self.probes)?;
+        progress.advance(view.camera.size[1].into());
+        Ok(WithProbes::frame(self, frame, view))
+    }
+
+    fn gpu(&self) -> Option<(&str, bool)> {
+        Some((self.renderer.device(), self.renderer.has_clock()))
+    }
+
+    fn probe_bytes(&self) -> [u64; 2] {
+        [self.probes.resident_bytes() as u64, self.renderer.probe_bytes()]
+    }
+}

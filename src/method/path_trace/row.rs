@@ -1,0 +1,150 @@
+//! Path tracing in the table of methods.
+
+use super::denoise::{DenoiseParams, denoise, guides};
+use super::denoise_gpu::Denoiser;
+use super::gpu::PathTracer;
+use super::{PathTraceParams, path_trace, path_trace_full};
+use crate::base::clock::Clock;
+use crate::base::named::{Parameters, apply, tree, within};
+use crate::base::progress::Progress;
+use crate::gpu::{Gpu, GpuScene};
+use crate::method::{Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
+use crate::transport::World;
+use crate::transport::path::PathParams;
+use crate::view::View;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::sync::Arc;
+
+/// The row.
+pub const METHOD: Method = Method {
+    name: "path-trace",
+    about: "The reference: path tracing",
+    reads: Reads::NOTHING,
+    layers: &["emission", "diffuse", "glossy"],
+    options: &["spp", "max-depth", "denoise", "layers", "budget-ms", "match-time", "set"],
+    samples: Some(Samples { option: "spp", pointer: "/path_trace/spp" }),
+    transmissive: true,
+    sequential: false,
+    parameters,
+    cpu,
+    gpu: Some(gpu),
+};
+
+/// All parameters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Params {
+    path_trace: PathTraceParams,
+    layers: LayerChoice,
+    /// Of the filter; `None` for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    denoise: Option<DenoiseParams>,
+}
+
+fn parameters(options: &Options) -> Result<Value> {
+    if !options.denoise && !options.set.is_empty() {
+        return Err(Error::Request("--set: of path-trace, the denoiser alone has parameters; give --denoise too".into()));
+    }
+    if options.denoise && options.layers == Some(LayerChoice::Full) {
+        return Err(Error::Request("--denoise filters layer by layer: leave --layers full out".into()));
+    }
+    let base = PathTraceParams::default();
+    let path_trace = PathTraceParams {
+        spp: options.spp.unwrap_or(base.spp),
+        path: PathParams { max_depth: options.max_depth.unwrap_or(base.path.max_depth), ..base.path },
+    };
+    path_trace.validate()?;
+    let denoise = options.denoise.then(|| apply(&DenoiseParams::default(), &options.set)).transpose()?;
+    tree(&Params { path_trace, layers: options.layers.unwrap_or_default(), denoise })
+}
+
+impl Parameters for PathTraceParams {
+    fn validate(&self) -> Result<()> {
+        within("spp", self.spp, 1..=1 << 24)
+    }
+}
+
+/// An error for a scene without light.
+fn check_lit(world: &World) -> Result<()> {
+    if world.scene.emitters.is_empty() {
+        return Err(Error::input(&world.scene.path, "has no emitter; every frame would be black"));
+    }
+    Ok(())
+}
+
+struct OnCpu<'a> {
+    world: &'a World,
+    params: Params,
+    seed: u32,
+}
+
+fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    check_lit(setup.world)?;
+    Ok(Box::new(OnCpu { world: setup.world, params: setup.parameters()?, seed: setup.seed }))
+}
+
+impl Renderer for OnCpu<'_> {
+    fn frame(&mut self, view: &View, _: Option<&View>, spp: u32, progress: &dyn Progress) -> Result<Frame> {
+        let (View { frame, camera }, world, seed) = (view, self.world, self.seed);
+        let params = PathTraceParams { spp, ..self.params.path_trace };
+        let mut clock = Clock::start();
+        if self.params.layers == LayerChoice::Full {
+            let full = path_trace_full(world, camera, &params, seed, *frame, progress);
+            clock.lap("path_trace");
+            return Ok(Frame { picture: Picture::Full(full), passes: clock.laps, unserved: None, inspected: None });
+        }
+        let mut layers = path_trace(world, camera, &params, seed, *frame, progress);
+        clock.lap("path_trace");
+        if let Some(d) = &self.params.denoise {
+            let guides = guides(world, camera, d, spp, seed, *frame);
+            clock.lap("guides");
+            layers = denoise(&layers, &guides, camera.size[0] as usize, d);
+            clock.lap("denoise");
+        }
+        Ok(Frame::of(layers, clock.laps))
+    }
+}
+
+struct OnGpu {
+    tracer: PathTracer,
+    denoiser: Option<Denoiser>,
+    layers: LayerChoice,
+    seed: u32,
+}
+
+fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    check_lit(setup.world)?;
+    let Params { path_trace, layers, denoise } = setup.parameters()?;
+    let scene = Arc::new(GpuScene::new(gpu, setup.world)?);
+    let denoiser = denoise.map(|d| Denoiser::new(scene.clone(), &d)).transpose()?;
+    let tracer = PathTracer::new(scene, &path_trace.path, layers == LayerChoice::All)?;
+    Ok(Box::new(OnGpu { tracer, denoiser, layers, seed: setup.seed }))
+}
+
+impl Renderer for OnGpu {
+    fn frame(&mut self, view: &View, _: Option<&View>, spp: u32, progress: &dyn Progress) -> Result<Frame> {
+        let (View { frame, camera }, seed) = (view, self.seed);
+        let mut clock = Clock::start();
+        if self.layers == LayerChoice::Full {
+            let full = self.tracer.full(camera, spp, seed, *frame, progress)?;
+            clock.lap("path_trace");
+            return Ok(Frame { picture: Picture::Full(full), passes: clock.laps, unserved: None, inspected: None });
+        }
+        let mut layers = self.tracer.layers(camera, spp, seed, *frame, progress)?;
+        clock.lap("path_trace");
+        if let Some(d) = &self.denoiser {
+            let guides = d.guides(camera, spp, seed, *frame)?;
+            clock.lap("guides");
+            layers = d.denoise(&layers, &guides)?;
+            clock.lap("denoise");
+        }
+        Ok(Frame::of(layers, clock.laps))
+    }
+
+    /// Its passes are as long as their pace says, so that the host times them.
+    fn gpu(&self) -> Option<(&str, bool)> {
+        Some((self.tracer.device(), false))
+    }
+}

@@ -1,0 +1,118 @@
+//! What all stages of a run share: options that every stage has, the scene, and who listens.
+
+use crate::base::progress::Progress;
+use crate::exchange::{LoadOptions, load};
+use crate::gpu::{Choice, Gpu};
+use crate::scene::Scene;
+use crate::transport::World;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Hears how far a stage has come, and what it has to say besides its result.
+pub trait Listener: Progress + Send + Sync {
+    /// Something is odd, but no error.
+    fn warn(&self, message: &str);
+    /// What is done next, or was done.
+    fn say(&self, line: &str);
+}
+
+/// Options of every stage.
+#[derive(Clone)]
+pub struct Context {
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Where to compute.
+    pub device: Choice,
+    /// Multiplies all lengths of the scene, to make them metres.
+    pub unit_scale: f32,
+    /// Values of the scene's parameters.
+    pub defines: Vec<(String, String)>,
+    /// Who listens.
+    pub listener: Arc<dyn Listener>,
+    /// The scene of the last stage: stages run in one process load it once.
+    scene: Arc<Mutex<Option<(PathBuf, Arc<World>)>>>,
+}
+
+/// What a stage did.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    /// For people.
+    pub summary: String,
+    /// For programs (`--json`).
+    pub figures: serde_json::Value,
+    /// A threshold was passed: exit code 1.
+    pub check_failed: bool,
+}
+
+impl Context {
+    /// A context; the scale must be positive.
+    pub fn new(
+        seed: u32,
+        device: Choice,
+        unit_scale: f32,
+        defines: Vec<(String, String)>,
+        listener: Arc<dyn Listener>,
+    ) -> Result<Self> {
+        if !(unit_scale.is_finite() && unit_scale > 0.0) {
+            return Err(Error::Request(format!("--unit-scale {unit_scale}: expected a positive number")));
+        }
+        Ok(Self { seed, device, unit_scale, defines, listener, scene: Arc::default() })
+    }
+
+    /// The same with another seed.
+    pub fn with_seed(&self, seed: u32) -> Self {
+        Self { seed, ..self.clone() }
+    }
+
+    /// Who hears how far a stage has come.
+    pub fn progress(&self) -> &dyn Progress {
+        &*self.listener
+    }
+
+    /// Loads a scene and tells its warnings.
+    pub fn load_scene(&self, path: &Path) -> Result<Scene> {
+        let options = LoadOptions { unit_scale: self.unit_scale, defines: self.defines.clone() };
+        let scene = load(path, &options)?;
+        scene.warnings.iter().for_each(|w| self.listener.warn(w));
+        Ok(scene)
+    }
+
+    /// The opaque part of a scene, ready for rays; says how many transmissive shapes were left out.
+    pub fn opaque_world(&self, path: &Path) -> Result<Arc<World>> {
+        let mut slot = self.scene.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, world)) = slot.as_ref().filter(|(p, _)| p == path) {
+            return Ok(world.clone());
+        }
+        let (world, left_out) = World::opaque(self.load_scene(path)?);
+        if left_out > 0 {
+            let message = format!("{left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces");
+            self.listener.warn(&message);
+        }
+        let world = Arc::new(world);
+        *slot = Some((path.into(), world.clone()));
+        Ok(world)
+    }
+
+    /// What `make` makes of the GPU that is asked for; `None` for the CPU. Where the choice is ours, a GPU on which that fails is passed over.
+    pub fn on_gpu<T>(&self, make: impl FnOnce(Arc<Gpu>) -> Result<T>) -> Result<Option<T>> {
+        let made = Gpu::open(&self.device).and_then(|gpu| gpu.map(|gpu| make(Arc::new(gpu))).transpose());
+        match made {
+            Err(e) if self.device == Choice::Auto => {
+                self.listener.warn(&format!("on the CPU, since: {e}"));
+                Ok(None)
+            }
+            made => made,
+        }
+    }
+
+    /// An error where a GPU is asked for by what has no use for one.
+    pub fn refuse_gpu(&self, what: &str) -> Result<()> {
+        match self.device {
+            Choice::Auto | Choice::Cpu => Ok(()),
+            Choice::Gpu | Choice::Named(_) => {
+                Err(Error::Request(format!("--device: {what} runs on the CPU alone; use --device cpu")))
+            }
+        }
+    }
+}

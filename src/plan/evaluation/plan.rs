@@ -1,0 +1,185 @@
+//! The stages of an evaluation: bakes that its methods share, bakes of their own, frames, reference.
+
+use super::Evaluate;
+use crate::base::named::split;
+use crate::plan::pipeline::{Bakes, Pipeline, needed};
+use crate::plan::stage::BAKES;
+use crate::plan::stages::{BakeProbes, RenderPath};
+use crate::plan::variant::{Variant, configure};
+use crate::plan::{Context, Stage};
+use crate::scene::Camera;
+use crate::view::View;
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A stage, and the variants (by index) that use its output.
+#[derive(Clone)]
+pub struct Planned {
+    /// The stage.
+    pub stage: Stage,
+    /// Its seed.
+    pub seed: u32,
+    /// Who reads its output; empty for the reference.
+    pub users: Vec<usize>,
+}
+
+/// What an evaluation does before it measures.
+#[derive(Default)]
+pub struct Plan {
+    /// Bakes in order.
+    pub bakes: Vec<Planned>,
+    /// The frames of each variant.
+    pub frames: Vec<Planned>,
+    /// Unless it was given.
+    pub reference: Option<Planned>,
+}
+
+impl Plan {
+    /// The stages in order.
+    pub fn stages(&self) -> impl Iterator<Item = &Planned> {
+        self.bakes.iter().chain(&self.frames).chain(&self.reference)
+    }
+
+    /// The probes that a variant reads, where it does.
+    pub fn probes(&self, variant: usize) -> Option<&PathBuf> {
+        match &self.frames[variant].stage {
+            Stage::RenderPath(render) => render.probes.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// Refuses frames that want other texels than their probes will have.
+    pub fn check_views(&self, views: &[View]) -> Result<()> {
+        let cameras: Vec<Camera> = views.iter().map(|v| v.camera.clone()).collect();
+        let bake_of = |probes: &PathBuf| {
+            self.bakes.iter().find_map(|p| match &p.stage {
+                Stage::BakeProbes(bake) if bake.output == *probes => Some(bake),
+                _ => None,
+            })
+        };
+        for planned in &self.frames {
+            let Stage::RenderPath(render) = &planned.stage else { continue };
+            let Some(bake) = render.probes.as_ref().and_then(bake_of).filter(|bake| bake.for_path.is_some()) else { continue };
+            if let Some(wanted) = render.served(&cameras)?
+                && !bake.served(&cameras)?.serve(&wanted)
+            {
+                let message = "these frames want texels that its probes are not baked with";
+                return Err(Error::Request(format!("{}: {message}", render.output.display())));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Plans all stages.
+pub fn plan(of: &Evaluate, cx: &Context) -> Result<Plan> {
+    let any_texel = of.variants.iter().any(|v| v.method.reads.probes.is_some_and(|p| p.any_texel));
+    let mut settings = of.settings.clone();
+    settings.all_texels |= any_texel;
+    let pipeline = Pipeline { scene: of.scene.clone(), path: Some(of.path.clone()), frames: of.frames.clone(), settings };
+    let mut plan = Plan::default();
+    // What each set of probes is asked for.
+    let mut choices: BTreeMap<PathBuf, Vec<String>> = BTreeMap::new();
+    for (index, variant) in of.variants.iter().enumerate() {
+        let bakes = folders(of, variant);
+        let render = render(&pipeline, of, variant, &bakes)?;
+        let mut stages = pipeline.bakes(&bakes);
+        for stage in &mut stages {
+            configure(stage, &of.bake_options)?;
+            variant.configure(stage)?;
+        }
+        let is_given =
+            |stage: &Stage| [&of.probes, &of.lightmap, &of.curvature].into_iter().flatten().any(|p| p == stage.output());
+        for stage in needed(stages.into_iter().filter(|s| !is_given(s)), &render.clone().into()) {
+            match plan.bakes.iter_mut().find(|p| p.stage.output() == stage.output()) {
+                Some(planned) => planned.users.push(index),
+                None => plan.bakes.push(Planned { stage, seed: cx.seed, users: vec![index] }),
+            }
+        }
+        if let Some(probes) = &render.probes {
+            let (choice, known) = (choice(variant), choices.entry(probes.clone()).or_default());
+            if !known.contains(&choice) {
+                known.push(choice);
+            }
+        }
+        plan.frames.push(Planned { stage: render.into(), seed: cx.seed, users: vec![index] });
+    }
+    for planned in &mut plan.bakes {
+        if let Stage::BakeProbes(bake) = &mut planned.stage
+            && bake.for_path.is_some()
+        {
+            choose(bake, choices.get(&bake.output).map_or(&[], Vec::as_slice));
+        }
+    }
+    // A stage follows what it reads: those that several variants share were planned with the first.
+    plan.bakes.sort_by_key(|p| BAKES.iter().position(|command| *command == p.stage.command()));
+    if of.reference.is_none() {
+        let stage = pipeline.reference(&of.reference_folder()).into();
+        // Not the samples of a path-traced method, whose errors would be the reference's.
+        plan.reference = Some(Planned { stage, seed: cx.seed.wrapping_add(1), users: Vec::new() });
+    }
+    Ok(plan)
+}
+
+/// The frames of a variant.
+fn render(pipeline: &Pipeline, of: &Evaluate, variant: &Variant, bakes: &Bakes) -> Result<RenderPath> {
+    let mut stage = pipeline.render(variant.method, bakes, &of.frames_folder(variant));
+    let named = |e: Error| Error::Request(format!("{}: {e}", variant.name));
+    for (option, value) in &variant.options {
+        stage.set(option, value.as_deref()).map_err(named)?;
+    }
+    stage.set.extend(variant.sets.iter().cloned());
+    stage.check().map_err(named)?;
+    Ok(stage)
+}
+
+/// Asks the bake for what all `choices` ask for. The default is the first of them, or that which differs from it the least; the paper's choice
+/// is never the first, as it would change the probes' roughness with it.
+fn choose(bake: &mut BakeProbes, choices: &[String]) {
+    let is_paper = |choice: &String| split(choice).iter().any(|part| part == "paper");
+    let base = choices.iter().position(String::is_empty).or_else(|| choices.iter().position(|c| !is_paper(c)));
+    for (i, choice) in choices.iter().enumerate() {
+        if Some(i) == base {
+            bake.set.extend(split(choice));
+        } else {
+            bake.alternative.push(choice.clone());
+        }
+    }
+}
+
+/// What a variant changes of the choice of texels; empty for nothing.
+fn choice(variant: &Variant) -> String {
+    let paper = variant.options.iter().any(|(name, _)| name == "--paper").then_some("paper");
+    let sets = variant.sets.iter().map(String::as_str).filter(|s| s.starts_with("gather."));
+    paper.into_iter().chain(sets).collect::<Vec<_>>().join(",")
+}
+
+/// Where a variant's bakes lie: in the common folder, and from the first stage with options of its own in one named after those.
+fn folders(of: &Evaluate, variant: &Variant) -> Bakes {
+    let root = of.bakes.clone().unwrap_or_else(|| of.output.join("bakes"));
+    let common = Bakes::within(&root);
+    let within = |stages: &[&str]| own(variant, stages).map(|name| Bakes::within(&root.join(name)));
+    let given = |own: Option<PathBuf>, given: &Option<PathBuf>, common: PathBuf| own.or(given.clone()).unwrap_or(common);
+    let [place, resmap, qhmap, curvature, lightmap, _] = BAKES;
+    Bakes {
+        grid: within(&[place]).map_or(common.grid, |b| b.grid),
+        resmap: within(&[place, resmap]).map_or(common.resmap, |b| b.resmap),
+        qhmap: within(&[place, resmap, qhmap]).map_or(common.qhmap, |b| b.qhmap),
+        curvature: given(within(&[curvature]).map(|b| b.curvature), &of.curvature, common.curvature),
+        lightmap: given(within(&[lightmap]).map(|b| b.lightmap), &of.lightmap, common.lightmap),
+        probes: given(within(&BAKES).map(|b| b.probes), &of.probes, common.probes),
+    }
+}
+
+/// The variant's own options of some stages as a folder's name; `None` where it has none.
+fn own(variant: &Variant, stages: &[&str]) -> Option<String> {
+    let mine = variant.bakes.iter().filter(|(stage, _)| stages.contains(&stage.as_str()));
+    let mut texts: Vec<String> = mine
+        .map(|(stage, (name, value))| format!("{stage}{name}{}", value.as_ref().map_or(String::new(), |v| format!("={v}"))))
+        .collect();
+    texts.sort();
+    let name = texts.join("+");
+    let safe = |c: char| if c.is_ascii_alphanumeric() || "-_.+=".contains(c) { c } else { '_' };
+    (!name.is_empty()).then(|| name.chars().map(safe).collect())
+}

@@ -1,0 +1,177 @@
+//! The loop over a path's frames, for every method: kept frames, equal time, layers, timings.
+
+use super::budget::Budget;
+use super::timings::{FrameTimings, Timings};
+use super::{Context, Outcome};
+use crate::Result;
+use crate::base::clock::timed;
+use crate::base::progress::Silent;
+use crate::io::jobs::is_finished;
+use crate::io::{ExrImage, Provenance, atomic};
+use crate::method::{Frame, Method, Renderer, Setup};
+use crate::scene::Camera;
+use crate::view::View;
+use crate::view::aov::with_first_hits;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Frames that are rendered to find the sample count of a budget.
+const PILOTS: usize = 3;
+
+/// Frames of one method.
+pub struct Frames<'a> {
+    /// The method.
+    pub method: &'a Method,
+    /// What they are made of.
+    pub setup: &'a Setup<'a>,
+    /// Where they come from; the parameters are filled in.
+    pub provenance: Provenance,
+    /// Their folder.
+    pub output: &'a Path,
+    /// How long they may take, where samples are chosen by that.
+    pub budget: Option<Budget>,
+    /// Makes the renderer, once there is something to render.
+    pub make: &'a dyn Fn() -> Result<Box<dyn Renderer + 'a>>,
+}
+
+/// Renders the views that are not finished, with the sample count that is given or that the budget allows.
+pub fn render(frames: &Frames, cx: &Context, mut timings: Timings) -> Result<Outcome> {
+    let mut renderer = None;
+    timings.samples = frames.method.count(frames.setup.parameters);
+    if let Some(budget) = &frames.budget {
+        timings.budget_ms = Some(budget.ms);
+        let renderer = made(&mut renderer, frames, &mut timings)?;
+        timings.samples = Some(choose_samples(frames.setup.views, renderer, budget)?);
+        // Before the frames are rendered with it, so that a run that is stopped can be repeated.
+        atomic::write_json(&frames.output.join("timings.json"), &timings)?;
+    }
+    let samples = timings.samples.unwrap_or(1);
+    let parameters = frames.method.with_samples(frames.setup.parameters, samples);
+    let provenance: Vec<Provenance> = frames.setup.views.iter().map(|view| frames.provenance_of(view, &parameters)).collect();
+    let mut kept: Vec<bool> =
+        frames.setup.views.iter().zip(&provenance).map(|(view, p)| is_finished(&frames.output.join(name(view)), p)).collect();
+    if frames.method.sequential && kept.contains(&false) {
+        kept.fill(false);
+    }
+    let progress = cx.progress();
+    let views = frames.setup.views;
+    progress.start(frames.method.name, views.iter().map(|v| u64::from(v.camera.size[1])).sum());
+    for (i, ((view, provenance), kept)) in views.iter().zip(provenance).zip(kept).enumerate() {
+        let mut times = FrameTimings { name: name(view), kept, ..FrameTimings::default() };
+        if kept {
+            progress.advance(view.camera.size[1].into());
+        } else {
+            let renderer = made(&mut renderer, frames, &mut timings)?;
+            let frame = renderer.frame(view, views.get(i + 1), samples, progress)?;
+            timings.note_probes(renderer.probe_bytes());
+            times.passes(&frame.passes);
+            times.unserved_fraction = frame.unserved.map(|n| n as f64 / frames.sub_pixels(view));
+            let image = times.pass_if(frames.setup.inspect, "aov", || frames.image(&frame, view));
+            let path = frames.output.join(&times.name);
+            times.pass("write", || image.with_provenance(provenance).write(&path))?;
+        }
+        timings.frames.push(times);
+    }
+    progress.finish();
+    finish(timings, frames.output)
+}
+
+/// The renderer, made when it is first needed.
+fn made<'r, 'a>(
+    renderer: &'r mut Option<Box<dyn Renderer + 'a>>,
+    frames: &Frames<'a>,
+    timings: &mut Timings,
+) -> Result<&'r mut (dyn Renderer + 'a)> {
+    if renderer.is_none() {
+        let new = (frames.make)()?;
+        if let Some((device, has_clock)) = new.gpu() {
+            timings.on_gpu(device, has_clock);
+        }
+        *renderer = Some(new);
+    }
+    renderer.as_deref_mut().ok_or_else(|| crate::Error::Request("no renderer".into()))
+}
+
+fn name(view: &View) -> String {
+    format!("{:04}.exr", view.frame)
+}
+
+/// The count whose frames take as long as the budget allows, by frames of three views.
+fn choose_samples(views: &[View], renderer: &mut dyn Renderer, budget: &Budget) -> Result<u32> {
+    let pilots: Vec<&View> = (0..PILOTS.min(views.len())).map(|i| &views[i * views.len() / PILOTS.min(views.len())]).collect();
+    let mut time = |count: u32| {
+        let mut sum = 0.0;
+        for view in &pilots {
+            let mut times = FrameTimings::default();
+            times.passes(&renderer.frame(view, None, count, &Silent)?.passes);
+            sum += super::timings::frame_ms(&times.passes_ms);
+        }
+        Ok(sum / pilots.len() as f64)
+    };
+    budget.choose(&mut time)
+}
+
+impl Frames<'_> {
+    fn provenance_of(&self, view: &View, parameters: &Value) -> Provenance {
+        let parameters = json!({
+            "method": self.method.name, "frame": view.frame, "aov": self.setup.inspect, "camera": describe(&view.camera),
+            "parameters": parameters,
+        });
+        Provenance { parameters, ..self.provenance.clone() }
+    }
+
+    /// Rays through a view's pixels.
+    fn sub_pixels(&self, view: &View) -> f64 {
+        let supersample = self.setup.parameters["supersample"].as_u64().unwrap_or(1) as f64;
+        view.camera.size.iter().map(|&s| f64::from(s) * supersample).product()
+    }
+
+    /// The frame, its layers, and the auxiliary ones.
+    fn image(&self, frame: &Frame, view: &View) -> ExrImage {
+        let [width, height] = view.camera.size.map(|n| n as usize);
+        let mut image = frame.with_pictures(ExrImage::new(width, height));
+        if self.setup.inspect {
+            image = with_first_hits(image, self.setup.world, &view.camera);
+        }
+        if let Some(more) = &frame.inspected {
+            image.channels.extend(more.channels.iter().cloned());
+        }
+        image
+    }
+}
+
+/// The camera, as provenance keeps it.
+fn describe(camera: &Camera) -> Value {
+    json!({
+        "to_world": camera.to_world.to_cols_array(), "fov_x_rad": camera.fov_x, "size": camera.size,
+        "aperture_radius": camera.aperture_radius, "focus_distance": camera.focus_distance,
+    })
+}
+
+/// Writes `timings.json` and sums up the run.
+fn finish(mut timings: Timings, output: &Path) -> Result<Outcome> {
+    timings.finish(&output.join("timings.json"));
+    atomic::write_json(&output.join("timings.json"), &timings)?;
+    let kept = timings.frames.iter().filter(|f| f.kept).count();
+    let count = timings.frames.len();
+    let mean: f64 = timings.mean_ms.values().sum();
+    let out = output.display();
+    let summary = match kept {
+        k if k == count => format!("{count} frames in {out} were finished already"),
+        0 => format!("{count} frames in {out}, {mean:.0} ms a frame"),
+        _ => format!("{count} frames in {out}, {kept} of them finished already, {mean:.0} ms a frame"),
+    };
+    let figures = serde_json::to_value(&timings).map_err(|e| crate::Error::Request(e.to_string()))?;
+    Ok(Outcome { summary, figures, check_failed: false })
+}
+
+impl FrameTimings {
+    /// Runs a pass and notes its time, where `noted` holds.
+    fn pass_if<T>(&mut self, noted: bool, name: &str, work: impl FnOnce() -> T) -> T {
+        let (result, ms) = timed(work);
+        if noted {
+            self.passes_ms.insert(name.into(), ms);
+        }
+        result
+    }
+}

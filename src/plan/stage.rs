@@ -1,0 +1,147 @@
+//! A stage of a pipeline: one of the subcommands that read files and write files.
+
+use super::stages::{BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
+use super::{Context, Outcome};
+use crate::Result;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+/// A stage with its inputs and options.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Stage {
+    /// `place-probes`
+    PlaceProbes(PlaceProbes),
+    /// `resmap`
+    Resmap(Resmap),
+    /// `qhmap`
+    Qhmap(Qhmap),
+    /// `curvature`
+    Curvature(Curvature),
+    /// `bake-lightmap`
+    BakeLightmap(BakeLightmap),
+    /// `bake-probes`
+    BakeProbes(BakeProbes),
+    /// `render-path`
+    RenderPath(RenderPath),
+    /// `compare`
+    Compare(Compare),
+}
+
+/// The stages that bake, in the order in which they run.
+pub const BAKES: [&str; 6] =
+    [PlaceProbes::COMMAND, Resmap::COMMAND, Qhmap::COMMAND, Curvature::COMMAND, BakeLightmap::COMMAND, BakeProbes::COMMAND];
+
+/// Does the same with whichever stage it is.
+macro_rules! with {
+    ($stage:expr, $s:ident => $what:expr) => {
+        match $stage {
+            Stage::PlaceProbes($s) => $what,
+            Stage::Resmap($s) => $what,
+            Stage::Qhmap($s) => $what,
+            Stage::Curvature($s) => $what,
+            Stage::BakeLightmap($s) => $what,
+            Stage::BakeProbes($s) => $what,
+            Stage::RenderPath($s) => $what,
+            Stage::Compare($s) => $what,
+        }
+    };
+}
+
+macro_rules! from {
+    ($($name:ident),+) => { $(impl From<$name> for Stage {
+        fn from(stage: $name) -> Self {
+            Self::$name(stage)
+        }
+    })+ };
+}
+from!(PlaceProbes, Resmap, Qhmap, Curvature, BakeLightmap, BakeProbes, RenderPath, Compare);
+
+impl Stage {
+    /// The subcommand.
+    pub fn command(&self) -> &'static str {
+        fn of<T>(_: &T, command: &'static str) -> &'static str {
+            command
+        }
+        match self {
+            Self::PlaceProbes(s) => of(s, PlaceProbes::COMMAND),
+            Self::Resmap(s) => of(s, Resmap::COMMAND),
+            Self::Qhmap(s) => of(s, Qhmap::COMMAND),
+            Self::Curvature(s) => of(s, Curvature::COMMAND),
+            Self::BakeLightmap(s) => of(s, BakeLightmap::COMMAND),
+            Self::BakeProbes(s) => of(s, BakeProbes::COMMAND),
+            Self::RenderPath(s) => of(s, RenderPath::COMMAND),
+            Self::Compare(s) => of(s, Compare::COMMAND),
+        }
+    }
+
+    /// Gives an option a value, by its name.
+    pub fn set(&mut self, option: &str, value: Option<&str>) -> Result<()> {
+        with!(self, s => s.set(option, value))
+    }
+
+    /// Refuses options that do not go together or are out of range; reads no file.
+    pub fn check(&self) -> Result<()> {
+        with!(self, s => s.check())
+    }
+
+    /// What it writes.
+    pub fn output(&self) -> &Path {
+        with!(self, s => &s.output)
+    }
+
+    /// What it reads of what other stages write.
+    pub fn inputs(&self) -> Vec<&PathBuf> {
+        match self {
+            Self::PlaceProbes(_) | Self::Curvature(_) | Self::BakeLightmap(_) => vec![],
+            Self::Resmap(s) => vec![&s.probes],
+            Self::Qhmap(s) => vec![&s.resmap],
+            Self::BakeProbes(s) => [&s.probes, &s.qhmap].into_iter().chain(&s.lightmap).chain(&s.curvature).collect(),
+            Self::RenderPath(s) => s.probes.iter().chain(&s.lightmap).chain(&s.curvature).collect(),
+            Self::Compare(s) => vec![&s.image, &s.reference],
+        }
+    }
+
+    /// Checks, reads, computes and writes.
+    pub fn run(&self, cx: &Context) -> Result<Outcome> {
+        with!(self, s => s.run(cx))
+    }
+
+    /// Whether it can use a GPU, where `cx` asks for one.
+    pub fn uses_gpu(&self) -> bool {
+        matches!(self, Self::Resmap(_) | Self::BakeLightmap(_) | Self::BakeProbes(_) | Self::RenderPath(_))
+    }
+
+    fn reads_scene(&self) -> bool {
+        !matches!(self, Self::Qhmap(_) | Self::Compare(_))
+    }
+
+    /// The command and its arguments, as the program takes them.
+    pub fn arguments(&self, cx: &Context) -> Vec<OsString> {
+        let mut list: Vec<OsString> = vec![self.command().into()];
+        list.extend(with!(self, s => s.arguments()));
+        let mut option = |name: &str, value: String| list.extend([name.into(), value.into()]);
+        option("--seed", cx.seed.to_string());
+        if self.reads_scene() && cx.unit_scale != 1.0 {
+            option("--unit-scale", cx.unit_scale.to_string());
+        }
+        if self.uses_gpu() && cx.device != crate::gpu::Choice::Auto {
+            option("--device", cx.device.to_string());
+        }
+        if self.reads_scene() {
+            for (name, value) in &cx.defines {
+                option("--define", format!("{name}={value}"));
+            }
+        }
+        list
+    }
+
+    /// What a person would type.
+    pub fn command_line(&self, cx: &Context) -> String {
+        let quote = |a: &OsString| {
+            let a = a.to_string_lossy();
+            let plain = |c: char| c.is_alphanumeric() || "-_./,:=+%@".contains(c);
+            if !a.is_empty() && a.chars().all(plain) { a.into_owned() } else { format!("'{}'", a.replace('\'', r"'\''")) }
+        };
+        format!("reprobe {}", self.arguments(cx).iter().map(quote).collect::<Vec<_>>().join(" "))
+    }
+}

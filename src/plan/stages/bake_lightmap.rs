@@ -1,0 +1,164 @@
+//! `bake-lightmap`.
+
+use crate::base::clock::seconds;
+use crate::base::named::within;
+use crate::gpu::{GpuScene, Paths};
+use crate::io::jobs::{Done, Shard, is_finished};
+use crate::io::{ExrImage, Provenance};
+use crate::lightmap::parts::Folder;
+use crate::lightmap::{AtlasParams, LightMap, LightMapParams, Plan, lookup};
+use crate::plan::option::stage;
+use crate::plan::{Context, Outcome};
+use crate::transport::World;
+use crate::transport::follow::Follow;
+use crate::{Error, Result};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+stage! {
+    /// Bakes the diffuse light map.
+    BakeLightmap "bake-lightmap"
+    {
+        /// The scene.
+        scene,
+    }
+    {
+        /// Samples a texel.
+        "--spp" spp: Option<u32>,
+        /// Samples a texel of a first pass, from whose map the paths of the second read diffuse light.
+        "--first-spp" first_spp: Option<u32>,
+        /// About how many texels the surfaces get in all.
+        "--texels" texels: Option<u32>,
+        /// Edge of a texel, metres, in place of the above.
+        "--texel" texel: Option<f32>,
+        /// Bake this shard's blocks only.
+        "--shard" shard: Option<Shard>,
+        /// The light map to write.
+        "--output" output: PathBuf,
+    }
+}
+
+impl BakeLightmap {
+    fn params(&self) -> Result<LightMapParams> {
+        if self.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
+            return Err(Error::Request(format!("-o {}: expected a file name that ends in .exr", self.output.display())));
+        }
+        if self.texel.is_some() && self.texels.is_some() {
+            return Err(Error::Request("--texel, --texels: expected one of them".into()));
+        }
+        let base = LightMapParams::default();
+        let atlas = AtlasParams { texel: self.texel, budget: self.texels.unwrap_or(base.atlas.budget) };
+        let params = LightMapParams {
+            spp: self.spp.unwrap_or(base.spp),
+            first_spp: self.first_spp.unwrap_or(base.first_spp),
+            atlas,
+            ..base
+        };
+        within("--spp", params.spp, 1..=1 << 24)?;
+        within("--first-spp", params.first_spp, 0..=1 << 24)?;
+        within("--texels", atlas.budget, 1..=1 << 26)?;
+        Ok(params)
+    }
+
+    /// Refuses options that are out of range.
+    pub fn check(&self) -> Result<()> {
+        self.params().map(|_| ())
+    }
+
+    /// Reads the scene, bakes the blocks that are missing, puts them together.
+    pub fn run(&self, cx: &Context) -> Result<Outcome> {
+        let params = self.params()?;
+        let clock = seconds();
+        let world = cx.opaque_world(&self.scene)?;
+        let loaded = clock();
+        let provenance = Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params);
+        if is_finished(&self.output, &provenance) {
+            let summary = format!("{}: up to date", self.output.display());
+            return Ok(Outcome { summary, figures: json!({ "up_to_date": true }), ..Outcome::default() });
+        }
+        let plan = Plan::new(&world, &params, cx.seed)?;
+        let key = serde_json::to_string(&provenance).map_err(|e| Error::Request(e.to_string()))?;
+        let [first_store, store] = [".first.parts", ".parts"].map(|ending| Folder::new(&beside(&self.output, ending), &key));
+        let planned = clock() - loaded;
+
+        let scene = cx.on_gpu(|gpu| GpuScene::new(gpu, &world))?;
+        let first = self.first_pass(cx, &plan, &params, &first_store, scene.as_ref())?;
+        let scene = match (scene, &first) {
+            (Some(scene), Some(map)) => Some(scene.with_lightmap(map)?),
+            (scene, _) => scene,
+        };
+        let device = on_gpu(scene, &params)?;
+        let device = device.as_ref().map(|d| d as &dyn Follow);
+        let pass = plan.second_pass(first.as_ref()).on(device);
+        let done = plan.run(&pass, &store, self.shard, cx.progress(), || {
+            write(&plan, &world, &store, &provenance, &self.output)?;
+            first_store.remove()
+        })?;
+        Ok(self.outcome(&plan, &params, done, device.map_or("cpu", Follow::device), [loaded, planned, clock()]))
+    }
+
+    /// The map of the first pass, where there is one; every shard needs all of it.
+    fn first_pass(
+        &self,
+        cx: &Context,
+        plan: &Plan,
+        params: &LightMapParams,
+        store: &Folder,
+        scene: Option<&GpuScene>,
+    ) -> Result<Option<LightMap>> {
+        let Some(pass) = plan.first_pass() else { return Ok(None) };
+        let device = on_gpu(scene.cloned(), params)?;
+        plan.run(&pass.on(device.as_ref().map(|d| d as &dyn Follow)), store, None, cx.progress(), || Ok(()))?;
+        plan.map(store).map(Some)
+    }
+
+    fn outcome(&self, plan: &Plan, params: &LightMapParams, done: Done, device: &str, times: [f64; 3]) -> Outcome {
+        let atlas = &plan.atlas;
+        let ([width, height], Done { kept, missing, .. }, [loaded, planned, seconds]) = (atlas.size, done, times);
+        let state =
+            if missing > 0 { format!("; {missing} blocks are still missing: run the other shards") } else { String::new() };
+        Outcome {
+            summary: format!(
+                "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
+                self.output.display(),
+                atlas.charts.len(),
+                atlas.texel,
+                plan.len(),
+                plan.backs(),
+                params.spp,
+                plan.blocks(),
+            ),
+            figures: json!({
+                "size": atlas.size, "charts": atlas.charts.len(), "texel": atlas.texel, "texels": plan.len(), "backs": plan.backs(),
+                "spp": params.spp, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
+                "device": device, "seconds_load": loaded, "seconds_plan": planned, "seconds": seconds,
+            }),
+            ..Outcome::default()
+        }
+    }
+}
+
+fn on_gpu(scene: Option<GpuScene>, params: &LightMapParams) -> Result<Option<Paths>> {
+    scene.map(|scene| Paths::irradiance(Arc::new(scene), &params.path)).transpose()
+}
+
+/// The output's path with an ending more.
+fn beside(output: &Path, ending: &str) -> PathBuf {
+    let mut name = output.as_os_str().to_owned();
+    name.push(ending);
+    name.into()
+}
+
+/// Puts the blocks together, writes the map and then deletes them.
+fn write(plan: &Plan, world: &World, store: &Folder, provenance: &Provenance, output: &Path) -> Result<()> {
+    let baked = match plan.assemble(store) {
+        Ok(baked) => baked,
+        // Another shard was faster and has deleted the blocks.
+        Err(_) if ExrImage::read(output).is_ok_and(|i| i.provenance.as_ref() == Some(provenance)) => return Ok(()),
+        Err(e) => return Err(e),
+    };
+    let image = lookup::encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone());
+    image.write(output)?;
+    store.remove()
+}

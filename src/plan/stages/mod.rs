@@ -1,0 +1,20 @@
+//! The stages, a file each: options, checks, reading, the call, writing, and what is told of it.
+
+mod bake_lightmap;
+mod bake_probes;
+mod compare;
+mod curvature;
+mod place_probes;
+mod qhmap;
+mod render_path;
+mod resmap;
+mod set;
+
+pub use bake_lightmap::BakeLightmap;
+pub use bake_probes::BakeProbes;
+pub use compare::{Compare, frame_names, read_pair};
+pub use curvature::Curvature;
+pub use place_probes::PlaceProbes;
+pub use qhmap::Qhmap;
+pub use render_path::{Aov, RenderPath};
+pub use resmap::Resmap;

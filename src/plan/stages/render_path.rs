@@ -1,0 +1,290 @@
+//! `render-path`.
+
+use crate::base::clock::timed;
+use crate::io::Provenance;
+use crate::io::provenance::hash_file;
+use crate::lightmap::LightMap;
+use crate::method::glossy_probes::wanted::Views;
+use crate::method::glossy_probes::{self, GlossyProbeParams};
+use crate::method::{LayerChoice, METHODS, Method, Need, Options, Renderer, Setup};
+use crate::plan::budget::{self, Budget};
+use crate::plan::frames::{Frames, render};
+use crate::plan::option::{Size, stage};
+use crate::plan::timings::Timings;
+use crate::plan::views::{FrameList, views};
+use crate::plan::{Context, Outcome};
+use crate::probe::file::BakedSet;
+use crate::probe::store::SET_FILE;
+use crate::scene::Camera;
+use crate::surface::{CurvatureMap, curvature_file};
+use crate::transport::World;
+use crate::{Error, Result};
+use serde::de::IgnoredAny;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Memory that a GPU may be filled with, bytes.
+pub const GPU_MEMORY: u64 = 2 << 30;
+
+stage! {
+    /// Renders the frames of a camera path.
+    RenderPath "render-path"
+    {
+        /// The scene.
+        scene,
+    }
+    {
+        /// The camera path; the scene's own sensor is the one frame without it.
+        "--path" path: Option<PathBuf>,
+        /// Only these frames of it.
+        "--frames" frames: Option<FrameList>,
+        /// Size of the frames.
+        "--size" size: Option<Size>,
+        /// The row of the table of methods.
+        "--method" method: Option<String>,
+        /// Baked probes.
+        "--probes" probes: Option<PathBuf>,
+        /// The light map.
+        "--lightmap" lightmap: Option<PathBuf>,
+        /// Curvatures of the scene.
+        "--curvature" curvature: Option<PathBuf>,
+        /// N x N rays a pixel.
+        "--supersample" supersample: Option<u32>,
+        /// Paths a pixel.
+        "--spp" spp: Option<u32>,
+        /// Rays or taps a pixel.
+        "--samples" samples: Option<u32>,
+        /// Most scattering vertices of a path.
+        "--max-depth" max_depth: Option<u32>,
+        /// What to write of a path-traced frame.
+        "--layers" layers: Option<LayerChoice>,
+        /// Filter path-traced layers.
+        "--denoise" denoise: bool,
+        /// Choose the samples with which a frame takes so many milliseconds.
+        "--budget-ms" budget_ms: Option<f64>,
+        /// Choose those with which it takes as long as the frames of this folder.
+        "--match-time" match_time: Option<PathBuf>,
+        /// Memory that a GPU may be filled with, bytes.
+        "--gpu-memory" gpu_memory: Option<u64>,
+        /// The paper's text in every choice.
+        "--paper" paper: bool,
+        /// Parameters of the method, by name.
+        "--set" set: Vec<String>,
+        /// Auxiliary layers.
+        "--aov" aov: Option<Aov>,
+        /// Folder for the frames.
+        "--output" output: PathBuf,
+    }
+}
+
+/// Auxiliary layers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aov {
+    /// All there are.
+    All,
+}
+
+macro_rules! words {
+    ($type:ident { $($value:ident $word:literal),+ }) => {
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str(match self { $(Self::$value => $word),+ })
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = String;
+
+            fn from_str(text: &str) -> std::result::Result<Self, String> {
+                match text {
+                    $($word => Ok(Self::$value),)+
+                    _ => Err(format!("expected one of {}", [$($word),+].join(", "))),
+                }
+            }
+        }
+    };
+}
+words!(Aov { All "all" });
+words!(LayerChoice { All "all", Full "full" });
+crate::plan::option::text!(Aov, LayerChoice);
+
+/// Options that make sense together: what is computed.
+pub struct Resolved {
+    /// The method.
+    pub method: &'static Method,
+    /// Its parameters.
+    pub parameters: Value,
+}
+
+/// What was read.
+struct Inputs {
+    world: Arc<World>,
+    lightmap: Option<LightMap>,
+    curvature: Option<CurvatureMap>,
+    provenance: Provenance,
+}
+
+impl RenderPath {
+    /// The method's row.
+    pub fn method(&self) -> Result<&'static Method> {
+        self.method.as_deref().map_or(Ok(METHODS[0]), Method::find)
+    }
+
+    /// Options that not every method uses, and whether they are given.
+    fn given(&self) -> [(&'static str, bool); 14] {
+        [
+            ("probes", self.probes.is_some()),
+            ("lightmap", self.lightmap.is_some()),
+            ("curvature", self.curvature.is_some()),
+            ("supersample", self.supersample.is_some()),
+            ("spp", self.spp.is_some()),
+            ("samples", self.samples.is_some()),
+            ("max-depth", self.max_depth.is_some()),
+            ("layers", self.layers.is_some()),
+            ("denoise", self.denoise),
+            ("budget-ms", self.budget_ms.is_some()),
+            ("match-time", self.match_time.is_some()),
+            ("gpu-memory", self.gpu_memory.is_some()),
+            ("paper", self.paper),
+            ("set", !self.set.is_empty()),
+        ]
+    }
+
+    /// Checks all options, and reads nothing.
+    pub fn resolve(&self) -> Result<Resolved> {
+        let method = self.method()?;
+        if let Some((option, _)) = self.given().into_iter().find(|(option, given)| *given && !method.uses(option)) {
+            let others: Vec<&str> = METHODS.iter().filter(|m| m.uses(option)).map(|m| m.name).collect();
+            let name = method.name;
+            return Err(Error::Request(format!("--{option}: --method {name} has no use for it; {} has", others.join(", "))));
+        }
+        for (given, is_required, option, stage) in [
+            (self.probes.is_some(), method.reads.probes.is_some(), "probes DIR", method.reads.probes.map_or("", |p| p.stage)),
+            (self.lightmap.is_some(), method.reads.lightmap == Need::Required, "lightmap FILE", "bake-lightmap"),
+            (self.curvature.is_some(), method.reads.curvature == Need::Required, "curvature FILE", "curvature"),
+        ] {
+            if is_required && !given {
+                return Err(Error::Request(format!("--method {} needs --{option}, written by {stage}", method.name)));
+            }
+        }
+        let budgets = [self.budget_ms.is_some(), self.match_time.is_some(), self.spp.is_some(), self.samples.is_some()];
+        if budgets.into_iter().filter(|given| *given).count() > 1 {
+            return Err(Error::Request("--budget-ms, --match-time, --spp, --samples: expected one of them".into()));
+        }
+        budget::check(self.budget_ms)?;
+        let options = Options {
+            supersample: self.supersample,
+            spp: self.spp,
+            samples: self.samples,
+            max_depth: self.max_depth,
+            layers: self.layers,
+            denoise: self.denoise,
+            paper: self.paper,
+            set: self.set.clone(),
+        };
+        Ok(Resolved { method, parameters: (method.parameters)(&options)? })
+    }
+
+    /// Refuses what does not go together or is out of range.
+    pub fn check(&self) -> Result<()> {
+        self.resolve().map(|_| ())
+    }
+
+    /// The texels of probes that its views want, where the method can say it; `None` elsewhere.
+    pub fn served(&self, cameras: &[Camera]) -> Result<Option<Views>> {
+        let Resolved { method, parameters } = self.resolve()?;
+        if method.name != glossy_probes::METHOD.name {
+            return Ok(None);
+        }
+        let params: GlossyProbeParams = serde_json::from_value(parameters).map_err(|e| Error::Request(e.to_string()))?;
+        Ok(Some(Views::new(cameras, params.supersample, &params.gather)))
+    }
+
+    /// Reads, renders the frames that are not finished, writes them and what they took.
+    pub fn run(&self, cx: &Context) -> Result<Outcome> {
+        let Resolved { method, parameters } = self.resolve()?;
+        let mut timings = Timings::of(method.name);
+        let Inputs { world, lightmap, curvature, provenance } = self.inputs(cx, method, &mut timings)?;
+        let views = views(cx, &world.scene, self.path.as_deref(), self.size.map(|s| s.0), self.frames.as_ref())?;
+        let budget = Budget::read(self.budget_ms, self.match_time.as_deref(), cx)?;
+        let setup = Setup {
+            world: &world,
+            views: &views,
+            parameters: &parameters,
+            seed: cx.seed,
+            lightmap: lightmap.as_ref(),
+            curvature: curvature.as_ref(),
+            probes: self.probes.as_deref(),
+            inspect: self.aov.is_some(),
+            gpu_memory: self.gpu_memory.unwrap_or(GPU_MEMORY),
+        };
+        let make = || make(cx, method, &setup);
+        let frames = Frames { method, setup: &setup, provenance, output: &self.output, budget, make: &make };
+        render(&frames, cx, timings)
+    }
+
+    fn inputs(&self, cx: &Context, method: &Method, timings: &mut Timings) -> Result<Inputs> {
+        let world = if method.transmissive {
+            let (scene, load_ms) = timed(|| cx.load_scene(&self.scene));
+            let (world, build_ms) = timed(|| scene.map(World::new));
+            (timings.load_ms, timings.build_ms) = (load_ms, build_ms);
+            Arc::new(world?)
+        } else {
+            let (world, load_ms) = timed(|| cx.opaque_world(&self.scene));
+            timings.load_ms = load_ms;
+            world?
+        };
+        let scene = &world.scene;
+        let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
+        if let Some(folder) = &self.probes {
+            provenance = provenance.with_input("probes", hash_file(&folder.join(SET_FILE))?);
+            if method.reads.probes.is_some_and(|p| p.any_texel) {
+                warn_of_partial_set(folder, method, cx);
+            }
+        }
+        let curvature = match &self.curvature {
+            Some(file) => {
+                provenance = provenance.with_input("curvature", hash_file(file)?);
+                Some(curvature_file::read(file, scene.geometry.positions.len(), &scene.hash)?)
+            }
+            None => None,
+        };
+        let lightmap = match &self.lightmap {
+            Some(file) => {
+                provenance = provenance.with_input("lightmap", hash_file(file)?);
+                Some(LightMap::load(file, scene)?)
+            }
+            None => None,
+        };
+        if lightmap.is_none() && method.reads.lightmap == Need::Wanted {
+            cx.listener.warn("no --lightmap: the diffuse layer is black");
+        }
+        Ok(Inputs { lightmap, curvature, provenance, world })
+    }
+}
+
+/// The method's renderer, on the GPU that is asked for or on the CPU.
+fn make<'a>(cx: &Context, method: &Method, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let on_gpu = match method.gpu {
+        Some(make) => cx.on_gpu(|gpu| make(gpu, setup))?,
+        None => {
+            cx.refuse_gpu(&format!("--method {}", method.name))?;
+            None
+        }
+    };
+    on_gpu.map_or_else(|| (method.cpu)(setup), Ok)
+}
+
+/// A set that was baked for views lacks texels that other methods want.
+fn warn_of_partial_set(folder: &Path, method: &Method, cx: &Context) {
+    let text = std::fs::read_to_string(folder.join(SET_FILE)).unwrap_or_default();
+    if serde_json::from_str::<BakedSet<IgnoredAny>>(&text).is_ok_and(|set| set.views.is_some()) {
+        cx.listener.warn(&format!(
+            "{}: baked for the views of another method: {} wants other texels, and goes without those that are missing; bake without \
+             --for-path to be fair to it",
+            folder.display(),
+            method.name
+        ));
+    }
+}

@@ -1,0 +1,42 @@
+//! Folders with a file a probe: filled in parallel, sealed by `set.json` when complete.
+
+use crate::Result;
+use crate::base::progress::Progress;
+use crate::io::jobs::{Done, complete, is_finished};
+use crate::probe::set::{ProbeSet, numbered};
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// Makes all files of `set` that `folder` does not hold yet, by `make(state, index)`, and then marks it as complete.
+/// Each thread takes a state that nobody else uses, made by `state` when there is none.
+pub fn fill<S: Send>(
+    folder: &Path,
+    set: &ProbeSet,
+    progress: &dyn Progress,
+    state: impl Fn() -> Result<S> + Sync,
+    make: impl Fn(&mut S, usize) -> Result<()> + Sync,
+) -> Result<Done> {
+    let stage = &set.provenance.stage;
+    let sealed = set.is_complete_or_unmark(folder, stage)?;
+    let items: Vec<usize> = (0..set.count).collect();
+    let is_kept = |i| match numbered(folder, i) {
+        file if sealed => file.is_file(),
+        file => is_finished(&file, &set.provenance),
+    };
+    let states = Mutex::new(Vec::new());
+    let make_all = |todo: &[usize]| {
+        progress.start(stage, todo.len() as u64);
+        todo.par_iter().with_max_len(1).try_for_each(|&i| {
+            let spare = states.lock().unwrap_or_else(PoisonError::into_inner).pop();
+            let mut own = spare.map_or_else(&state, Ok)?;
+            make(&mut own, i)?;
+            states.lock().unwrap_or_else(PoisonError::into_inner).push(own);
+            progress.advance(1);
+            Ok::<(), crate::Error>(())
+        })?;
+        progress.finish();
+        Ok(())
+    };
+    complete(&items, None, &is_kept, make_all, || if sealed { Ok(()) } else { set.write(folder) })
+}
