@@ -15,6 +15,7 @@ use reprobe::surface::curvature_file;
 use reprobe::transport::World;
 use reprobe::view::gbuffer::gbuffer;
 use reprobe::view::mirror::mirror_pass;
+use serde::de::IgnoredAny;
 use std::path::Path;
 use timing::time;
 
@@ -33,7 +34,7 @@ fn main() {
     let curvature = curvature_file::read(Path::new(curvature), world.scene.geometry.positions.len(), &world.scene.hash);
     let curvature = curvature.expect("curvatures of this scene");
     let camera = Camera { size, ..world.scene.sensor.clone().expect("a sensor") };
-    let mut store = ProbeStore::open(Path::new(probes), &world.scene, usize::MAX).expect("probes of this scene");
+    let mut store = ProbeStore::<IgnoredAny>::open(Path::new(probes), &world.scene, usize::MAX).expect("probes of this scene");
     let near: Vec<_> = nearest_probes(&store.set.grid, camera.position(), 8)
         .into_iter()
         .map(|(i, t)| (i, store.probe(i).expect("a probe"), GatherParams::default().probe_weight(t)))

@@ -6,6 +6,7 @@ use super::{AtlasParams, LightMap, testing};
 use crate::base::math::Rgb;
 use crate::base::progress::Silent;
 use crate::base::ray::Ray;
+use crate::io::jobs::Done;
 use crate::material::bsdf::{Bsdf, Conductor, Diffuse, TwoSided};
 use crate::material::{Material, Surface, Texture};
 use crate::scene::{Camera, Emitter, Geometry, Scene};
@@ -40,7 +41,7 @@ fn bake(world: &World, params: &LightMapParams) -> LightMap {
     let plan = Plan::new(world, params, 1).unwrap();
     let map = |pass: &Pass| {
         let store = Memory::default();
-        plan.run(pass, &store, &|_| true, &Silent).unwrap();
+        plan.run(pass, &store, None, &Silent, || Ok(())).unwrap();
         plan.map(&store).unwrap()
     };
     let first = plan.first_pass().map(|pass| map(&pass));
@@ -281,24 +282,25 @@ fn shards_and_threads_and_taking_up_a_killed_bake_change_no_bit() {
     let plan = Plan::new(&world, &params, 7).unwrap();
     assert!(plan.blocks() >= 3, "{} blocks", plan.blocks());
     let whole = Memory::default();
-    plan.run(&plan.second_pass(None), &whole, &|_| true, &Silent).unwrap();
+    plan.run(&plan.second_pass(None), &whole, None, &Silent, || Ok(())).unwrap();
     let expected = plan.assemble(&whole).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let parts = Memory::default();
     pool.install(|| {
         let plan = Plan::new(&world, &params, 7).unwrap();
         assert!(plan.assemble(&parts).is_err(), "blocks are missing");
-        assert_eq!(plan.run(&plan.second_pass(None), &parts, &|b| b % 2 == 1, &Silent).unwrap(), 0);
-        assert_eq!(
-            plan.run(&plan.second_pass(None), &parts, &|_| true, &Silent).unwrap(),
-            plan.blocks() / 2,
-            "finished blocks are kept"
-        );
+        let run = |shard: Option<&str>| {
+            let shard = shard.map(|s| s.parse().unwrap());
+            plan.run(&plan.second_pass(None), &parts, shard, &Silent, || Ok(())).unwrap()
+        };
+        let (half, rest) = (plan.blocks() as usize / 2, plan.blocks().div_ceil(2) as usize);
+        assert_eq!(run(Some("1/2")), Done { made: half, kept: 0, missing: rest });
+        assert_eq!(run(None), Done { made: rest, kept: half, missing: 0 }, "finished blocks are kept");
         assert_eq!(plan.assemble(&parts).unwrap(), expected);
     });
     assert!(parts.get(0, 1).is_none());
     let other = Plan::new(&world, &params, 8).unwrap();
     let store = Memory::default();
-    other.run(&other.second_pass(None), &store, &|_| true, &Silent).unwrap();
+    other.run(&other.second_pass(None), &store, None, &Silent, || Ok(())).unwrap();
     assert_ne!(other.assemble(&store).unwrap(), expected, "the seed counts");
 }

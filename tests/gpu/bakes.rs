@@ -4,13 +4,14 @@ use crate::{gpu, room};
 use glam::Vec3;
 use reprobe::base::math::Rgb;
 use reprobe::base::progress::Silent;
-use reprobe::gpu::{GpuScene, LightPaths};
+use reprobe::gpu::{GpuScene, Paths};
 use reprobe::lightmap::parts::Memory;
-use reprobe::lightmap::{AtlasParams, BakeParams as LightParams, LightMap, Plan};
-use reprobe::method::glossy_probes::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
-use reprobe::method::glossy_probes::gpu::paths::ProbePaths;
+use reprobe::lightmap::{AtlasParams, LightMap, LightMapParams as LightParams, Plan};
+use reprobe::method::glossy_probes::bake::{Bake, ProbeBakeParams as BakeParams, bake_glossy, probe_geometry};
 use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::transport::World;
+use reprobe::transport::follow::Follow;
+use reprobe::transport::path::PathParams;
 use std::sync::Arc;
 
 /// Share of the values that differ by more than a half float's rounding.
@@ -21,19 +22,19 @@ fn apart(a: &[Rgb], b: &[Rgb]) -> f32 {
     a.iter().zip(b).filter(differ).count() as f32 / a.len() as f32
 }
 
-pub fn lightmap(world: &World, params: &LightParams, gpu: Option<(&GpuScene, &LightPaths)>) -> LightMap {
+pub fn lightmap(world: &World, params: &LightParams, gpu: Option<(&GpuScene, &Paths)>) -> LightMap {
     let plan = Plan::new(world, params, 7).unwrap();
     let run = |pass: &reprobe::lightmap::bake::Pass| {
         let store = Memory::default();
-        plan.run(pass, &store, &|_| true, &Silent).unwrap();
+        plan.run(pass, &store, None, &Silent, || Ok(())).unwrap();
         plan.map(&store).unwrap()
     };
-    let first = plan.first_pass().map(|pass| run(&pass.on_gpu(gpu.map(|(_, paths)| paths))));
+    let first = plan.first_pass().map(|pass| run(&pass.on(gpu.map(|(_, paths)| paths as &dyn Follow))));
     let second = gpu
         .zip(first.as_ref())
-        .map(|((scene, _), map)| LightPaths::new(Arc::new(scene.with_lightmap(map).unwrap()), &params.path).unwrap());
+        .map(|((scene, _), map)| Paths::irradiance(Arc::new(scene.with_lightmap(map).unwrap()), &params.path).unwrap());
     let gpu = second.as_ref().or(gpu.map(|(_, paths)| paths));
-    run(&plan.second_pass(first.as_ref()).on_gpu(gpu))
+    run(&plan.second_pass(first.as_ref()).on(gpu.map(|paths| paths as &dyn Follow)))
 }
 
 #[test]
@@ -43,7 +44,7 @@ fn light_maps_are_the_cpus() {
     let scene = GpuScene::new(gpu, &world).unwrap();
     let atlas = AtlasParams { texel: Some(0.4), ..AtlasParams::default() };
     let params = LightParams { spp: 8, first_spp: 4, atlas, ..LightParams::default() };
-    let paths = LightPaths::new(Arc::new(scene.clone()), &params.path).unwrap();
+    let paths = Paths::irradiance(Arc::new(scene.clone()), &params.path).unwrap();
     let (a, b) = (lightmap(&world, &params, Some((&scene, &paths))), lightmap(&world, &params, None));
     let share = apart(&a.front, &b.front);
     assert!(share < 0.02, "{share} of the texels differ");
@@ -60,12 +61,12 @@ fn probes_are_the_cpus() {
     let scene = GpuScene::new(gpu, &world).unwrap();
     let (plain, lit) = (Arc::new(scene.clone()), Arc::new(scene.with_lightmap(&map).unwrap()));
     for (scene, lightmap) in [(plain, None), (lit, Some(&map))] {
-        let paths = ProbePaths::new(scene, &BakeParams::default()).unwrap();
+        let paths = Paths::scattering(scene, BakeParams::default().query(), &PathParams::default()).unwrap();
         for error in [None, Some(0.2)] {
             let params = BakeParams { spp: 24, error, ..BakeParams::default() };
-            let bake = |gpu| {
+            let bake = |device| {
                 let mut probe = probe_geometry(&world, Vec3::new(0.3, 1.4, 0.2), ParameterMap::identity([48, 24]));
-                let bake = Bake { world: &world, params: &params, seed: 2, lightmap, gpu };
+                let bake = Bake { world: &world, params: &params, seed: 2, lightmap, device };
                 let traced = bake_glossy(&bake, &mut probe, 1, &|i| i % 7 != 0, &Silent).unwrap();
                 let glossy: Vec<Rgb> = probe.texels.iter().map(|t| t.glossy()).collect();
                 (traced, glossy)
@@ -77,7 +78,4 @@ fn probes_are_the_cpus() {
             assert!(share < 0.02, "light map {}, error {error:?}: {share} of the texels differ", lightmap.is_some());
         }
     }
-    let spread = BakeParams { spread: true, ..BakeParams::default() };
-    let Err(error) = ProbePaths::new(Arc::new(scene), &spread) else { panic!("made it") };
-    assert!(error.to_string().contains("--spread"), "{error}");
 }

@@ -5,7 +5,7 @@ use crate::paths::difference;
 use crate::{gpu, room};
 use reprobe::base::math::Rgb;
 use reprobe::gpu::view::frame::BaselineFrame;
-use reprobe::lightmap::{AtlasParams, BakeParams, LightMap};
+use reprobe::lightmap::{AtlasParams, LightMap, LightMapParams};
 use reprobe::method::image_space_gather::gpu::ImageSpaceGather;
 use reprobe::method::image_space_gather::{ImageSpaceGatherParams, gather_image, mirror_image};
 use reprobe::method::lightmap_rt::gpu::LightmapRt;
@@ -30,7 +30,7 @@ impl Setting {
     fn new() -> Self {
         let world = room();
         let atlas = AtlasParams { texel: Some(0.3), ..AtlasParams::default() };
-        let lightmap = lightmap(&world, &BakeParams { spp: 4, atlas, ..BakeParams::default() }, None);
+        let lightmap = lightmap(&world, &LightMapParams { spp: 4, atlas, ..LightMapParams::default() }, None);
         let camera = Camera { size: [64, 36], ..world.scene.sensor.clone().unwrap() };
         let fine = Camera { size: camera.size.map(|s| s * SUPERSAMPLE), ..camera.clone() };
         let view = gbuffer(&world, &CurvatureMap::flat(world.scene.geometry.positions.len()), &fine);
