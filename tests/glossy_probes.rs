@@ -7,7 +7,7 @@ use reprobe::exchange::{LoadOptions, load};
 use reprobe::io::Provenance;
 use reprobe::lightmap::lookup::sides;
 use reprobe::lightmap::{Atlas, AtlasParams};
-use reprobe::method::glossy_probes::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
+use reprobe::method::glossy_probes::bake::{Bake, ProbeBakeParams, bake_glossy, probe_geometry};
 use reprobe::method::glossy_probes::candidates::Candidates;
 use reprobe::method::glossy_probes::coverage::{CoverageParams, SubPixels, covered_pixels};
 use reprobe::method::glossy_probes::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
@@ -68,12 +68,12 @@ impl Setup {
         let curvature = curvature(&scene.geometry, &CurvatureParams::default(), &Silent);
         let (world, left_out) = World::opaque(scene);
         assert_eq!(left_out, 0);
-        let params = BakeParams { spp: 4, ..BakeParams::default() };
+        let params = ProbeBakeParams { spp: 4, ..ProbeBakeParams::default() };
         let probes = (0..8u32)
             .map(|i| {
                 let corner = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) - 0.5;
                 let mut probe = probe_geometry(&world, centre + corner * spacing, ParameterMap::identity([width, width / 2]));
-                let bake = Bake { world: &world, params: &params, seed: 0, lightmap: None, gpu: None };
+                let bake = Bake { world: &world, params: &params, seed: 0, lightmap: None, device: None };
                 bake_glossy(&bake, &mut probe, i, &|_| true, &Silent).unwrap();
                 probe
             })
@@ -241,8 +241,8 @@ fn what_perfect_mirrors_show_of_lamps_needs_no_texels() {
     let texels = atlas.size[0] * atlas.size[1];
     let colours = (0..texels).map(|i| Vec3::new((i % 7) as f32, (i % 5) as f32, (i % 3) as f32)).collect();
     let map = sides(&setup.world.scene.geometry, &atlas, colours, None);
-    let params = BakeParams { spp: 4, ..BakeParams::default() };
-    let bake = Bake { world: &setup.world, params: &params, seed: 0, lightmap: Some(&map), gpu: None };
+    let params = ProbeBakeParams { spp: 4, ..ProbeBakeParams::default() };
+    let bake = Bake { world: &setup.world, params: &params, seed: 0, lightmap: Some(&map), device: None };
     assert!(bake.tells_mirrored());
     for (i, probe) in setup.probes.iter_mut().enumerate() {
         bake_glossy(&bake, probe, i as u32, &|_| true, &Silent).unwrap();
@@ -354,9 +354,9 @@ fn adaptive_sampling_spends_paths_where_they_are_needed() {
         let lift = r#"<transform name="to_world"><translate value="0,0,0.1"/></transform>"#;
         let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{lift}{reflector}</shape>"#)));
         let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([64, 32]));
-        let params = BakeParams { spp: MOST, error, roughness_scale: 0.5, ..BakeParams::default() };
+        let params = ProbeBakeParams { spp: MOST, error, roughness_scale: 0.5, ..ProbeBakeParams::default() };
         let traced = bake_glossy(
-            &Bake { world: &world, params: &params, seed, lightmap: None, gpu: None },
+            &Bake { world: &world, params: &params, seed, lightmap: None, device: None },
             &mut probe,
             0,
             &|_| true,
