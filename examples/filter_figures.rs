@@ -6,7 +6,7 @@
 use glam::{Vec2, Vec3};
 use image::{GrayImage, Luma, Rgb as Pixel, RgbImage};
 use reprobe::base::math::hash_words;
-use reprobe::method::glossy_probes::filter::{FilterInput, FilterParams, Kernel, Method, filter};
+use reprobe::method::glossy_probes::filter::{Convolution, FilterInput, FilterParams, Kernel, filter};
 use reprobe::method::glossy_probes::footprint::{Footprint, FootprintParams, ggx};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -117,8 +117,8 @@ fn variants(folder: &Path) -> Result<(), image::ImageError> {
     const SIZE: usize = 256;
     let input = noise(SIZE, SIZE, 1.0);
     let run = |method| input.filter(&FilterParams { method, kernel: Kernel::Gaussian, ..FilterParams::default() });
-    let full = run(Method::Full);
-    let panels = [input.color.clone(), full.clone(), run(Method::TwoPass), run(Method::FourPass)];
+    let full = run(Convolution::Full);
+    let panels = [input.color.clone(), full.clone(), run(Convolution::TwoPass), run(Convolution::FourPass)];
     let mut picture = GrayImage::new(4 * SIZE as u32, 2 * SIZE as u32);
     for (k, panel) in panels.iter().enumerate() {
         let square: f32 = panel.iter().zip(&full).map(|(a, b)| (a.x - b.x).powi(2)).sum();

@@ -2,7 +2,7 @@
 
 use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, Pass, Plan, SPLIT};
 use super::parts::Record;
-use super::visible::View;
+use super::visible::Sight;
 use crate::Result;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;
@@ -21,7 +21,7 @@ const MAX_REGIONS: usize = 4;
 /// The samples of a texel that count.
 struct Choice {
     /// What they see.
-    view: View,
+    view: Sight,
     /// A point of each region that the texel falls into, above which its samples see each other.
     regions: Vec<Surface>,
     /// Number and region of each sample.
@@ -95,13 +95,13 @@ impl Plan<'_> {
     fn choose(&self, pass: &Pass, texel: usize, back: bool) -> Choice {
         let visibility = self.visibility();
         let first: Vec<_> = (0..FIRST_SAMPLES).map(|i| self.draw(pass, texel, back, i)).collect();
-        let views: Vec<View> = first.iter().map(|(s, sampler)| visibility.view(s, back, &mut sampler.clone())).collect();
-        let best = views.iter().max().copied().unwrap_or(View::Inside);
-        if best == View::Inside {
+        let views: Vec<Sight> = first.iter().map(|(s, sampler)| visibility.view(s, back, &mut sampler.clone())).collect();
+        let best = views.iter().max().copied().unwrap_or(Sight::Inside);
+        if best == Sight::Inside {
             return Choice { view: best, regions: Vec::new(), samples: Vec::new() };
         }
         let plain = views.iter().all(|&v| v == best)
-            && (best == View::Contact || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
+            && (best == Sight::Contact || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
         if !plain {
             return self.choose_in_part(pass, texel, back, best);
         }
@@ -109,7 +109,7 @@ impl Plan<'_> {
     }
 
     /// The samples of a texel of which some are hidden, or lie in several regions.
-    fn choose_in_part(&self, pass: &Pass, texel: usize, back: bool, wanted: View) -> Choice {
+    fn choose_in_part(&self, pass: &Pass, texel: usize, back: bool, wanted: Sight) -> Choice {
         let visibility = self.visibility();
         let (mut regions, mut samples): (Vec<Surface>, _) = (Vec::new(), Vec::new());
         for i in 0..pass.spp.saturating_mul(TRIES).max(FIRST_SAMPLES) {
@@ -134,9 +134,9 @@ impl Plan<'_> {
     /// The largest region that gets any light, and of those one from which the sensor is seen in two segments, if there is one.
     fn settle(&self, choice: &Choice, sums: &[Sum], back: bool) -> Record {
         let flag = match choice.view {
-            View::Inside => return record(Rgb::ZERO, 0),
-            View::Contact => CONTACT,
-            View::Open => OPEN,
+            Sight::Inside => return record(Rgb::ZERO, 0),
+            Sight::Contact => CONTACT,
+            Sight::Open => OPEN,
         };
         let mut lit: Vec<_> = choice.regions.iter().zip(sums).filter(|(_, sum)| sum.light != Rgb::ZERO).collect();
         let split = if lit.len() < sums.len() && !lit.is_empty() { SPLIT } else { 0 };

@@ -27,7 +27,7 @@ const LIFT_TEXELS: f32 = 0.2;
 
 /// What a sample point can see.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum View {
+pub enum Sight {
     /// Inside a solid.
     Inside,
     /// Pressed against other geometry.
@@ -61,7 +61,7 @@ impl Visibility<'_> {
     }
 
     /// Sorts a sample point by short rays over its hemisphere; most points need just one.
-    pub fn view(&self, surface: &Surface, back: bool, sampler: &mut Sampler) -> View {
+    pub fn view(&self, surface: &Surface, back: bool, sampler: &mut Sampler) -> Sight {
         let frame = Frame::from_normal(facing(surface, back));
         let turn = sampler.next_2d();
         for i in 0..4 {
@@ -70,15 +70,15 @@ impl Visibility<'_> {
             let sin2 = 0.2 + 0.6 * (turn.y + 0.25 * (i * 2 % 4) as f32 + 0.125 * (i / 2) as f32).fract();
             let (sin, cos) = (sin2.sqrt(), (1.0 - sin2).sqrt());
             let d = frame.to_world(Vec3::new(sin * phi.cos(), sin * phi.sin(), cos));
-            let Some(hit) = self.world.closest(&surface.spawn(d)) else { return View::Open };
+            let Some(hit) = self.world.closest(&surface.spawn(d)) else { return Sight::Open };
             if self.meets_inner_side(&hit, d) {
-                return View::Inside;
+                return Sight::Inside;
             }
             if hit.t * cos > CONTACT_TEXELS * self.atlas.texel {
-                return View::Open;
+                return Sight::Open;
             }
         }
-        View::Contact
+        Sight::Contact
     }
 
     fn meets_inner_side(&self, hit: &Hit, d: Vec3) -> bool {

@@ -21,7 +21,7 @@ struct PathFile {
     fov_axis: FovAxis,
     /// Width and height, pixels.
     size: Option<[u32; 2]>,
-    frames: Option<Vec<Frame>>,
+    frames: Option<Vec<FrameEntry>>,
     keyframes: Option<Vec<Keyframe>>,
     /// Frames a second between keyframes.
     fps: Option<f64>,
@@ -29,7 +29,7 @@ struct PathFile {
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Frame {
+struct FrameEntry {
     origin: DVec3,
     target: DVec3,
     #[serde(default = "y_up")]
@@ -82,14 +82,14 @@ fn parse(path: &Path, text: &str, sensor: Option<&Camera>, unit_scale: f32) -> R
     if frames.is_empty() {
         return Err(bad("the path has no frame".into()));
     }
-    let camera = |(i, frame): (usize, &Frame)| {
+    let camera = |(i, frame): (usize, &FrameEntry)| {
         camera(frame, &file, size, sensor, unit_scale).map_err(|m| bad(format!("{what}[{i}]: {m}")))
     };
     frames.iter().enumerate().map(camera).collect()
 }
 
 fn camera(
-    frame: &Frame,
+    frame: &FrameEntry,
     file: &PathFile,
     size: [u32; 2],
     sensor: Option<&Camera>,
@@ -100,7 +100,7 @@ fn camera(
         Some(fov) => return Err(format!("fov = {fov}: expected more than 0 and less than 180 degrees")),
         None => sensor.map(|s| s.fov_x).ok_or("no \"fov\", and the scene has no sensor to take it from")?,
     };
-    let Frame { origin, target, up, .. } = *frame;
+    let FrameEntry { origin, target, up, .. } = *frame;
     let (origin_f32, target_f32) = (origin.as_vec3() * unit_scale, target.as_vec3() * unit_scale);
     if !(origin_f32.is_finite() && target_f32.is_finite() && up.as_vec3().is_finite()) {
         return Err(format!("origin {origin}, target {target}, up {up}: expected finite numbers"));
@@ -113,7 +113,7 @@ fn camera(
 }
 
 /// Frames at every 1 / fps second from the first keyframe to the last.
-fn interpolate(keys: &[Keyframe], file: &PathFile) -> std::result::Result<Vec<Frame>, String> {
+fn interpolate(keys: &[Keyframe], file: &PathFile) -> std::result::Result<Vec<FrameEntry>, String> {
     let (Some(first), Some(last)) = (keys.first(), keys.last()) else { return Ok(Vec::new()) };
     if let Some((i, pair)) = keys.windows(2).enumerate().find(|(_, k)| k[0].time >= k[1].time) {
         return Err(format!("keyframes[{}]: time {} follows {}: expected ascending times", i + 1, pair[1].time, pair[0].time));
@@ -139,7 +139,7 @@ fn interpolate(keys: &[Keyframe], file: &PathFile) -> std::result::Result<Vec<Fr
     let fovs = some_fov.then(|| column(&|k| DVec3::splat(k.fov.or(file.fov).unwrap_or(0.0))));
     let frame = |i: usize| {
         let time = (first.time + i as f64 / fps).min(last.time);
-        Frame {
+        FrameEntry {
             origin: spline.at(&origins, time),
             target: spline.at(&targets, time),
             up: spline.at(&ups, time),

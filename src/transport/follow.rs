@@ -88,14 +88,14 @@ pub trait Follow: Sync {
 #[derive(Clone, Copy)]
 pub enum Purpose<'a> {
     /// Light that the lobes of the query scatter towards the viewer; and what moves a sample's beginning within its texel, where something does.
-    Scattering(Query, Option<&'a Seen<'a>>),
+    Scattering(Query, Option<&'a Elsewhere<'a>>),
     /// Light for a light map.
     Irradiance,
 }
 
 /// Surface, and direction towards the viewer, of a sample at an offset in [0, 1)² of the texel whose start has this index; `None` for the
 /// start's own.
-pub type Seen<'a> = dyn Fn(usize, Vec2) -> Option<(Surface, Vec3)> + Sync + 'a;
+pub type Elsewhere<'a> = dyn Fn(usize, Vec2) -> Option<(Surface, Vec3)> + Sync + 'a;
 
 /// Follows paths on the CPU's threads.
 pub struct OnCpu<'a> {
@@ -118,8 +118,8 @@ impl OnCpu<'_> {
             Purpose::Irradiance => {
                 transmitted_irradiance(self.world, surface, start.wo[0] < 0.0, self.known, &self.params, &mut sampler)
             }
-            Purpose::Scattering(query, seen) => {
-                let (surface, wo) = seen.and_then(|seen| seen(i, offset)).unwrap_or((*surface, start.wo.into()));
+            Purpose::Scattering(query, elsewhere) => {
+                let (surface, wo) = elsewhere.and_then(|elsewhere| elsewhere(i, offset)).unwrap_or((*surface, start.wo.into()));
                 scattered(self.world, &surface, wo, query, self.known, &self.params, &mut sampler)
             }
         }

@@ -2,7 +2,7 @@
 
 use crate::gpu;
 use glam::Vec3;
-use reprobe::method::glossy_probes::filter::{FilterInput, FilterParams, Kernel, Method, NOT_GLOSSY, filter};
+use reprobe::method::glossy_probes::filter::{Convolution, FilterInput, FilterParams, Kernel, NOT_GLOSSY, filter};
 use reprobe::method::glossy_probes::gpu::filter::Filter;
 use reprobe::transport::Sampler;
 
@@ -37,9 +37,11 @@ fn the_filter_is_the_cpus() {
         covariance: &covariance,
         energy: &energy,
     };
-    for (kernel, method) in
-        [(Kernel::Gaussian, Method::FourPass), (Kernel::Ggx, Method::FourPass), (Kernel::Gaussian, Method::TwoPass)]
-    {
+    for (kernel, method) in [
+        (Kernel::Gaussian, Convolution::FourPass),
+        (Kernel::Ggx, Convolution::FourPass),
+        (Kernel::Gaussian, Convolution::TwoPass),
+    ] {
         let params = FilterParams { kernel, method, ..FilterParams::default() };
         let on_gpu = Filter::new(gpu.clone(), &params).unwrap();
         let (a, b) = (on_gpu.filter(&input).unwrap(), filter(&input, &params));
@@ -49,7 +51,7 @@ fn the_filter_is_the_cpus() {
         let changed = b.iter().zip(&color).filter(|(b, c)| b.distance(**c) > 0.1).count();
         assert!(changed * 2 > n, "the filter did next to nothing");
     }
-    let full = FilterParams { method: Method::Full, ..FilterParams::default() };
+    let full = FilterParams { method: Convolution::Full, ..FilterParams::default() };
     let Err(error) = Filter::new(gpu, &full) else { panic!("made it") };
     assert!(error.to_string().contains("filter.method"), "{error}");
 }

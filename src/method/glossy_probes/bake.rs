@@ -11,7 +11,7 @@ use crate::material::bsdf::{Lobes, Query};
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
 use crate::probe::parameter_map::ParameterMap;
 use crate::transport::World;
-use crate::transport::follow::{Follow, OnCpu, PathStart, PathSum, Purpose, Seen};
+use crate::transport::follow::{Elsewhere, Follow, OnCpu, PathStart, PathSum, Purpose};
 use crate::transport::path::{KnownDiffuse, PathParams};
 use crate::view::gbuffer::is_glossy;
 use crate::view::mirror::mirror_hit;
@@ -233,8 +233,8 @@ fn trace(
             let Bake { world, params, lightmap, .. } = *bake;
             let known = lightmap.map(|map| |s: &Surface, wo: Vec3| map.diffuse_radiance(&world.scene, s, wo));
             let known = known.as_ref().map(|known| known as KnownDiffuse);
-            let spread = |i: usize, offset: Vec2| elsewhere(world, probe, &centres[i], offset);
-            let purpose = Purpose::Scattering(params.query(), params.spread.then_some(&spread as &Seen));
+            let spread = |i: usize, offset: Vec2| seen_at(world, probe, &centres[i], offset);
+            let purpose = Purpose::Scattering(params.query(), params.spread.then_some(&spread as &Elsewhere));
             OnCpu { world, purpose, known, params: PathParams::default() }.sums(&starts, &done)?
         }
     };
@@ -243,7 +243,7 @@ fn trace(
 }
 
 /// What a texel sees at an offset from its corner, where that is glossy and of the object that its centre sees.
-fn elsewhere(world: &World, probe: &Probe, centre: &Centre, offset: Vec2) -> Option<(Surface, Vec3)> {
+fn seen_at(world: &World, probe: &Probe, centre: &Centre, offset: Vec2) -> Option<(Surface, Vec3)> {
     let d = direction(&probe.map, centre.texel, offset);
     let seen = world.intersect(&Ray::new(probe.position, d))?;
     let object = world.scene.geometry.triangle_object[centre.hit.triangle as usize];

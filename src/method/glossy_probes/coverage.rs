@@ -74,7 +74,7 @@ pub struct Covered {
 }
 
 /// What decides whether two rays see the same.
-struct Seen {
+struct Shown {
     p: Vec3,
     normal: Vec3,
     depth: f32,
@@ -82,7 +82,7 @@ struct Seen {
     material: u32,
 }
 
-impl Seen {
+impl Shown {
     fn of(p: &Pixel) -> Self {
         let Pixel { surface, normal, depth, alpha, .. } = *p;
         Self { p: surface.p, normal, depth, alpha, material: surface.material }
@@ -168,7 +168,7 @@ impl Lit<'_> {
             return Covered { emission, diffuse, glossy: Rgb::ZERO };
         };
         let (p, normal) = (surface.p, facing_normal(&surface, wo));
-        let seen = Seen { p, normal, depth: surface.t, alpha: Some(alpha), material: surface.material };
+        let seen = Shown { p, normal, depth: surface.t, alpha: Some(alpha), material: surface.material };
         let (mirrored, light) = match lightmap.filter(|_| mirrors && alpha == 0.0) {
             Some(map) => mirror_light(world, map, &surface, wo),
             None if seen.is_sharp() => (mirror_hit(world, &surface, wo), Rgb::ZERO),
@@ -186,7 +186,7 @@ fn window(sub: &SubPixels, [x, y]: [usize; 2]) -> Vec<usize> {
 }
 
 fn has_edge(sub: &SubPixels, window: &[usize]) -> bool {
-    let seen = |i: usize| sub.view.pixels[i].as_ref().map(Seen::of);
+    let seen = |i: usize| sub.view.pixels[i].as_ref().map(Shown::of);
     let Some((&first, rest)) = window.split_first() else { return false };
     let (a, mirrored) = (seen(first), &sub.reflected[first]);
     rest.iter().any(|&i| match (&a, &seen(i)) {
@@ -197,7 +197,7 @@ fn has_edge(sub: &SubPixels, window: &[usize]) -> bool {
 }
 
 /// The glossy radiance of what a ray at `at` (sub-pixels) sees: that of the sub-pixels that show the same, the nearest most.
-fn glossy_of(sub: &SubPixels, window: &[usize], seen: &Seen, mirrored: &Reflected, at: Vec2) -> Rgb {
+fn glossy_of(sub: &SubPixels, window: &[usize], seen: &Shown, mirrored: &Reflected, at: Vec2) -> Rgb {
     let width = sub.view.size()[0];
     // Same surface and reflection; same surface; whatever is nearest.
     let mut best = [(Rgb::ZERO, 0.0f32); 3];
@@ -205,7 +205,7 @@ fn glossy_of(sub: &SubPixels, window: &[usize], seen: &Seen, mirrored: &Reflecte
         let Some(other) = sub.view.pixels[i].as_ref().filter(|p| p.alpha.is_some()) else { continue };
         let centre = Vec2::new((i % width) as f32, (i / width) as f32) + 0.5;
         let weight = 1.0 / (centre.distance_squared(at) + 0.1);
-        let surface = seen.same_surface(&Seen::of(other));
+        let surface = seen.same_surface(&Shown::of(other));
         let reflection = surface && seen.same_reflected(mirrored, &sub.reflected[i]);
         for (k, counts) in [reflection, surface, true].into_iter().enumerate() {
             if counts {

@@ -7,7 +7,7 @@ use super::filter::{FilterInput, FilterParams, NOT_GLOSSY, filter};
 use super::footprint::{Footprint, GlossyPoint};
 use super::gather::{Gathered, gather};
 use super::previous::{Previous, reproject_previous};
-use super::wanted::Views;
+use super::wanted::Served;
 use crate::Result;
 use crate::base::clock::Clock;
 use crate::base::math::Rgb;
@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A frame's layers, at its final size; their sum is the frame.
-pub struct Frame {
+pub struct Reprojected {
     /// LE: emission seen directly, and the environment.
     pub emission: Vec<Rgb>,
     /// L(S|D)*DE from the light map.
@@ -95,7 +95,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Renders the next frame of a path.
-    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore<Views>) -> Result<Frame> {
+    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore<Served>) -> Result<Reprojected> {
         let n = self.params.supersample;
         let fine = Camera { size: camera.size.map(|s| s * n), ..camera.clone() };
         let size = fine.size.map(|s| s as usize);
@@ -157,7 +157,7 @@ impl<'a> Renderer<'a> {
         });
         self.previous = Some(Previous { view, glossy });
         let [emission, diffuse, glossy] = layers;
-        Ok(Frame { emission, diffuse, glossy, passes: clock.laps, unserved, buffers })
+        Ok(Reprojected { emission, diffuse, glossy, passes: clock.laps, unserved, buffers })
     }
 }
 

@@ -3,8 +3,8 @@
 use super::GlossyProbeParams;
 use super::gpu::Renderer as OnGpu;
 use super::inspect::with_passes;
-use super::renderer::{Frame as Reprojected, Renderer as OnCpu};
-use super::wanted::Views;
+use super::renderer::{Renderer as OnCpu, Reprojected};
+use super::wanted::Served;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::gpu::Gpu;
@@ -54,19 +54,19 @@ fn parameters(options: &Options) -> Result<Value> {
 }
 
 /// The curvatures, and the probes of a set that serves the views.
-fn inputs<'a>(setup: &Setup<'a>, params: &GlossyProbeParams) -> Result<(&'a CurvatureMap, ProbeStore<Views>)> {
+fn inputs<'a>(setup: &Setup<'a>, params: &GlossyProbeParams) -> Result<(&'a CurvatureMap, ProbeStore<Served>)> {
     let curvature =
         setup.curvature.ok_or_else(|| Error::Request("curvatures are needed: --curvature FILE, written by curvature".into()))?;
     let folder = setup.required_probes()?;
-    let probes = ProbeStore::<Views>::open(&folder, &setup.world.scene, PROBE_CACHE)?;
+    let probes = ProbeStore::<Served>::open(&folder, &setup.world.scene, PROBE_CACHE)?;
     check_serves(&folder, &probes, setup.views, params)?;
     Ok((curvature, probes))
 }
 
 /// An error where a set lacks texels that the views ask for.
-fn check_serves(folder: &Path, probes: &ProbeStore<Views>, views: &[View], params: &GlossyProbeParams) -> Result<()> {
+fn check_serves(folder: &Path, probes: &ProbeStore<Served>, views: &[View], params: &GlossyProbeParams) -> Result<()> {
     let cameras: Vec<Camera> = views.iter().map(|v| v.camera.clone()).collect();
-    let needed = Views::new(&cameras, params.supersample, &params.gather);
+    let needed = Served::new(&cameras, params.supersample, &params.gather);
     if probes.set.views.as_ref().is_none_or(|views| views.serve(&needed)) {
         return Ok(());
     }
@@ -78,7 +78,7 @@ fn check_serves(folder: &Path, probes: &ProbeStore<Views>, views: &[View], param
 /// Either renderer, with its probes.
 struct WithProbes<R> {
     renderer: R,
-    probes: ProbeStore<Views>,
+    probes: ProbeStore<Served>,
     supersample: u32,
 }
 

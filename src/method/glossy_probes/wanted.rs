@@ -29,7 +29,7 @@ pub type Wanted = BTreeMap<usize, Vec<bool>>;
 /// The views that a partial bake serves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Views {
+pub struct Served {
     /// blake3 of each camera's numbers, hex.
     pub cameras: Vec<String>,
     /// Rays a pixel, along one side.
@@ -52,7 +52,7 @@ fn includes(whole: &GatherParams, part: &GatherParams) -> bool {
     part.probes <= whole.probes && GatherParams { probes: part.probes, ..whole.clone() } == *part
 }
 
-impl Views {
+impl Served {
     /// The views of `cameras`.
     pub fn new(cameras: &[Camera], supersample: u32, gather: &GatherParams) -> Self {
         let hash = |c: &Camera| {
@@ -83,7 +83,7 @@ impl Views {
     }
 
     /// Whether a bake for these views has all texels that `other` needs.
-    pub fn serve(&self, other: &Views) -> bool {
+    pub fn serve(&self, other: &Served) -> bool {
         self.supersample == other.supersample
             && other.choices().all(|gather| self.has(gather))
             && other.cameras.iter().all(|c| self.cameras.contains(c))
@@ -97,7 +97,7 @@ pub fn wanted_texels(
     grid: &ProbeGrid,
     map: &dyn Fn(usize) -> Result<ParameterMap>,
     cameras: &[Camera],
-    views: &Views,
+    views: &Served,
     progress: &dyn Progress,
 ) -> Result<Wanted> {
     let mut wanted: BTreeMap<usize, Vec<AtomicBool>> = BTreeMap::new();
@@ -149,7 +149,7 @@ mod tests {
     fn a_set_serves_fewer_probes_and_its_alternatives_and_nothing_else() {
         let camera = Camera::look_at(Vec3::ZERO, Vec3::Z, Vec3::Y, 1.0, [8, 8]);
         let base = GatherParams::default();
-        let views = |gather: &GatherParams| Views::new(std::slice::from_ref(&camera), 1, gather);
+        let views = |gather: &GatherParams| Served::new(std::slice::from_ref(&camera), 1, gather);
         let (one, every) = (GatherParams { probes: 1, ..base.clone() }, GatherParams { anchors: 1, ..base.clone() });
         assert!(views(&base).serve(&views(&one)) && !views(&one).serve(&views(&base)));
         assert!(!views(&base).serve(&views(&every)));
@@ -159,6 +159,6 @@ mod tests {
         assert!(!views(&every).serve(&both) && views(&GatherParams { falloff: 1.0, ..base }).serve(&views(&one)));
         // Sets that were baked before there were alternatives say nothing of them.
         let text = serde_json::to_string(&views(&one)).unwrap();
-        assert!(!text.contains("alternatives") && serde_json::from_str::<Views>(&text).unwrap() == views(&one));
+        assert!(!text.contains("alternatives") && serde_json::from_str::<Served>(&text).unwrap() == views(&one));
     }
 }

@@ -12,7 +12,7 @@ use crate::gpu::view::View;
 use crate::gpu::view::composite::{Composite, Layers};
 use crate::gpu::view::gbuffer::GBuffer;
 use crate::lightmap::LightMap;
-use crate::method::glossy_probes::renderer::Frame;
+use crate::view::layers::LayerImages;
 use crate::probe::file::{Probe, Texel};
 use crate::probe::store::ProbeStore;
 use crate::scene::Camera;
@@ -74,6 +74,16 @@ struct Target {
     counts: wgpu::Buffer,
     glossy: wgpu::Buffer,
     layers: Layers,
+}
+
+/// A frame, read back.
+pub struct UlrFrame {
+    /// Its layers.
+    pub layers: LayerImages,
+    /// Milliseconds a pass.
+    pub passes: Vec<(&'static str, f64)>,
+    /// Sub-pixels that no probe served.
+    pub unserved: usize,
 }
 
 /// The method on a device.
@@ -151,14 +161,14 @@ impl Ulr {
     }
 
     /// Renders a frame.
-    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore<impl DeserializeOwned>) -> Result<Frame> {
+    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore<impl DeserializeOwned>) -> Result<UlrFrame> {
         let (gpu, target) = (self.gpu.clone(), self.reserved(camera.size, probes.set.size)?);
         let frame = gpu.checked(|| self.passes(&target, camera, probes))??;
         self.target = Some(target);
         Ok(frame)
     }
 
-    fn passes(&mut self, t: &Target, camera: &Camera, probes: &mut ProbeStore<impl DeserializeOwned>) -> Result<Frame> {
+    fn passes(&mut self, t: &Target, camera: &Camera, probes: &mut ProbeStore<impl DeserializeOwned>) -> Result<UlrFrame> {
         let (gpu, view, eye) = (&*self.gpu, &t.view, camera.position());
         let fine = Camera { size: view.size, ..camera.clone() };
         let groups = groups(view.size, WORKGROUP);
@@ -189,7 +199,8 @@ impl Ulr {
         clock.restart();
         let ([emission, diffuse, glossy], unserved) = t.layers.read(gpu)?;
         clock.lap("read");
-        Ok(Frame { emission, diffuse, glossy, passes: [clock.laps, passes].concat(), unserved, buffers: None })
+        let layers = LayerImages { emission, diffuse, glossy };
+        Ok(UlrFrame { layers, passes: [clock.laps, passes].concat(), unserved })
     }
 
     fn kernel_params(&self, eye: [f32; 3], [width, height]: [u32; 2]) -> Params {

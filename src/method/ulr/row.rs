@@ -12,7 +12,6 @@ use crate::probe::store::ProbeStore;
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
-use crate::view::layers::LayerImages;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 use std::sync::Arc;
@@ -96,8 +95,7 @@ impl Renderer for OnGpu {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
         let frame = self.ulr.frame(&view.camera, &mut self.probes)?;
         progress.advance(view.camera.size[1].into());
-        let layers = LayerImages { emission: frame.emission, diffuse: frame.diffuse, glossy: frame.glossy };
-        Ok(Frame { unserved: Some(frame.unserved), ..Frame::of(layers, frame.passes) })
+        Ok(Frame { unserved: Some(frame.unserved), ..Frame::of(frame.layers, frame.passes) })
     }
 
     fn gpu(&self) -> Option<(&str, bool)> {

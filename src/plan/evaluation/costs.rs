@@ -5,7 +5,7 @@ use super::plan::{Plan, Planned};
 use crate::Result;
 use crate::base::clock::seconds;
 use crate::io::atomic;
-use crate::method::glossy_probes::wanted::Views;
+use crate::method::glossy_probes::wanted::Served;
 use crate::metric::evaluation::{Costs, MethodCost, ProbeCost, StageCost};
 use crate::plan::timings::{Timings, frame_ms, is_rendering};
 use crate::plan::{Context, pipeline};
@@ -65,7 +65,7 @@ fn method_cost(frames: &Path, probes: Option<&Path>, name: &str, costs: &Costs, 
 
 /// What a set of probes holds; `None` for a folder of something else.
 fn probe_cost(folder: &Path, scene: &Scene) -> Option<ProbeCost> {
-    let mut store = ProbeStore::<Views>::open(folder, scene, 8).ok()?;
+    let mut store = ProbeStore::<Served>::open(folder, scene, 8).ok()?;
     let baked: Vec<usize> = (0..store.set.files.len()).filter(|&i| !store.set.files[i].is_empty()).collect();
     let one = store.probe(*baked.first()?).ok()?.bytes();
     let count = store.set.grid.len() - store.set.grid.blocked.len();

@@ -11,7 +11,7 @@ use crate::method::Options;
 use crate::method::glossy_probes::bake::{Bake, PAPER_ROUGHNESS_SCALE, ProbeBakeParams, Traced, bake_glossy, probe_geometry};
 use crate::method::glossy_probes::gather::GatherParams;
 use crate::method::glossy_probes::resolve;
-use crate::method::glossy_probes::wanted::{Views, Wanted, wanted_texels};
+use crate::method::glossy_probes::wanted::{Served, Wanted, wanted_texels};
 use crate::plan::option::{Size, stage};
 use crate::plan::views::{FrameList, views};
 use crate::plan::{Context, Outcome};
@@ -108,9 +108,9 @@ impl BakeProbes {
     }
 
     /// The views that the bake is for.
-    pub fn served(&self, cameras: &[Camera]) -> Result<Views> {
+    pub fn served(&self, cameras: &[Camera]) -> Result<Served> {
         let (gather, alternatives) = self.choices()?;
-        let views = Views::new(cameras, self.supersample.unwrap_or(1), &gather);
+        let views = Served::new(cameras, self.supersample.unwrap_or(1), &gather);
         Ok(alternatives.iter().fold(views, |views, gather| views.or(gather)))
     }
 
@@ -169,7 +169,7 @@ impl BakeProbes {
         if let Some(file) = &self.lightmap {
             provenance = provenance.with_input("lightmap", hash_file(file)?);
         }
-        if ProbeStore::<Views>::open(&self.output, scene, 0).is_ok_and(|found| found.set.provenance == provenance) {
+        if ProbeStore::<Served>::open(&self.output, scene, 0).is_ok_and(|found| found.set.provenance == provenance) {
             let summary = format!("{}: up to date", self.output.display());
             return Ok(Outcome { summary, figures: json!({ "baked": 0, "up_to_date": true }), ..Outcome::default() });
         }
@@ -181,7 +181,7 @@ impl BakeProbes {
         Ok(self.outcome(&params, done, traced, &device, clock()))
     }
 
-    fn wanted(&self, cx: &Context, inputs: &Inputs, cameras: &[Camera], served: &Views) -> Result<Wanted> {
+    fn wanted(&self, cx: &Context, inputs: &Inputs, cameras: &[Camera], served: &Served) -> Result<Wanted> {
         let Inputs { world, grid, .. } = inputs;
         let file = self.curvature.as_ref().ok_or_else(|| Error::Request("--for-path needs --curvature".into()))?;
         let curvature = curvature_file::read(file, world.scene.geometry.positions.len(), &world.scene.hash)?;
@@ -196,7 +196,7 @@ impl BakeProbes {
         inputs: &Inputs,
         params: &ProbeBakeParams,
         wanted: Option<&Wanted>,
-        served: Option<Views>,
+        served: Option<Served>,
         provenance: &Provenance,
     ) -> Result<(Done, Traced, String)> {
         let Inputs { world, grid, maps } = inputs;

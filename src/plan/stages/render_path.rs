@@ -4,7 +4,7 @@ use crate::base::clock::timed;
 use crate::io::Provenance;
 use crate::io::provenance::hash_file;
 use crate::lightmap::LightMap;
-use crate::method::glossy_probes::wanted::Views;
+use crate::method::glossy_probes::wanted::Served;
 use crate::method::glossy_probes::{self, GlossyProbeParams};
 use crate::method::{LayerChoice, METHODS, Method, Need, Options, Renderer, Setup};
 use crate::plan::budget::{self, Budget};
@@ -192,13 +192,13 @@ impl RenderPath {
     }
 
     /// The texels of probes that its views want, where the method can say it; `None` elsewhere.
-    pub fn served(&self, cameras: &[Camera]) -> Result<Option<Views>> {
+    pub fn served(&self, cameras: &[Camera]) -> Result<Option<Served>> {
         let Resolved { method, parameters } = self.resolve()?;
         if method.name != glossy_probes::METHOD.name {
             return Ok(None);
         }
         let params: GlossyProbeParams = serde_json::from_value(parameters).map_err(|e| Error::Request(e.to_string()))?;
-        Ok(Some(Views::new(cameras, params.supersample, &params.gather)))
+        Ok(Some(Served::new(cameras, params.supersample, &params.gather)))
     }
 
     /// Reads, renders the frames that are not finished, writes them and what they took.

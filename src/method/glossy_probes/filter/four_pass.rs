@@ -4,7 +4,7 @@
 //! halved covariances, so that a neighbour round the corner of an edge is still reached.
 //! Ours: a pass steps along the axis nearest its direction and reads the two pixels nearest the line, each with its own range weight.
 
-use super::{FilterInput, FilterParams, Kernel, Method, NOT_GLOSSY, confidence, principal};
+use super::{Convolution, FilterInput, FilterParams, Kernel, NOT_GLOSSY, confidence, principal};
 use crate::base::math::{Rgb, floor};
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
@@ -52,7 +52,7 @@ struct Tap {
 /// Filters a frame.
 pub(super) fn four_pass(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
     let count = input.color.len();
-    let split = if params.method == Method::TwoPass { 1.0 } else { 2.0 };
+    let split = if params.method == Convolution::TwoPass { 1.0 } else { 2.0 };
     let axes: Vec<Axes> = (0..count)
         .into_par_iter()
         .map(|i| {

@@ -36,7 +36,7 @@ pub enum Kernel {
 /// How the sum is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum Convolution {
     /// Eq. 4 as it stands: quadratic in the radius.
     Full,
     /// Four one-dimensional passes (§6.3).
@@ -57,7 +57,7 @@ pub struct FilterParams {
     /// Spatial weights. Paper: Gaussian.
     pub kernel: Kernel,
     /// Evaluation. Paper: four passes.
-    pub method: Method,
+    pub method: Convolution,
     /// Smallest cosine between two normals that may mix, α_n. Paper: 0.8; ours, 0.98.
     pub min_normal_cos: f32,
     /// Largest difference in depth that may mix, α_d, m. Paper: 0.2; ours, 0.15.
@@ -74,7 +74,7 @@ impl Default for FilterParams {
     fn default() -> Self {
         Self {
             kernel: Kernel::Gaussian,
-            method: Method::FourPass,
+            method: Convolution::FourPass,
             min_normal_cos: 0.98,
             depth_threshold: 0.15,
             min_energy: 3.0,
@@ -140,8 +140,8 @@ pub fn filter(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
         return Vec::new();
     }
     match params.method {
-        Method::Full => full(input, params),
-        Method::FourPass | Method::TwoPass => four_pass::four_pass(input, params),
+        Convolution::Full => full(input, params),
+        Convolution::FourPass | Convolution::TwoPass => four_pass::four_pass(input, params),
     }
 }
 

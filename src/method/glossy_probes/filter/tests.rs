@@ -63,7 +63,7 @@ impl Frame {
 
 fn variants() -> Vec<FilterParams> {
     let mut all = Vec::new();
-    for method in [Method::Full, Method::FourPass] {
+    for method in [Convolution::Full, Convolution::FourPass] {
         for base in [FilterParams::default(), FilterParams::paper()] {
             all.push(FilterParams { method, ..base });
         }
@@ -76,16 +76,16 @@ fn rmse(a: &[Rgb], b: &[Rgb]) -> f32 {
     (sum / (3 * a.len()) as f64).sqrt() as f32
 }
 
-fn gaussian(method: Method) -> FilterParams {
+fn gaussian(method: Convolution) -> FilterParams {
     FilterParams { method, ..FilterParams::paper() }
 }
 
 #[test]
 fn four_passes_agree_with_the_full_filter_on_adversarial_noise() {
     let frame = Frame::adversarial(128);
-    let full = frame.filter(&gaussian(Method::Full));
-    let four = rmse(&frame.filter(&gaussian(Method::FourPass)), &full);
-    let two = rmse(&frame.filter(&gaussian(Method::TwoPass)), &full);
+    let full = frame.filter(&gaussian(Convolution::Full));
+    let four = rmse(&frame.filter(&gaussian(Convolution::FourPass)), &full);
+    let two = rmse(&frame.filter(&gaussian(Convolution::TwoPass)), &full);
     let spread = rmse(&full, &vec![Rgb::splat(0.5); full.len()]);
     println!("four passes {four}, two {two}, the full filter's own noise {spread}");
     assert!(four < 0.6 * two, "{four} {two}");
@@ -139,7 +139,7 @@ fn zero_energy_counts_as_the_clamp_and_not_as_infinite() {
     frame.energy.fill(1.0);
     let centre = 15 * 31 + 15;
     frame.color[centre] = Rgb::ONE;
-    for method in [Method::Full, Method::FourPass] {
+    for method in [Convolution::Full, Convolution::FourPass] {
         let with = |energy: f32, min_energy: f32| {
             let mut f = Frame { energy: frame.energy.clone(), color: frame.color.clone(), ..Frame::new(31, 31, [9.0, 0.0, 9.0]) };
             f.energy[centre] = energy;
@@ -166,7 +166,7 @@ fn a_zero_covariance_is_the_identity() {
 #[test]
 fn an_impulse_spreads_with_the_covariance_that_was_asked_for() {
     let wanted = [40.0, 18.0, 22.0];
-    for method in [Method::Full, Method::FourPass] {
+    for method in [Convolution::Full, Convolution::FourPass] {
         let mut frame = Frame::new(101, 101, wanted);
         frame.color.fill(Rgb::ZERO);
         frame.color[50 * 101 + 50] = Rgb::ONE;
@@ -192,12 +192,12 @@ fn the_passes_reproduce_the_tails_of_ggx() {
     frame.color.fill(Rgb::ZERO);
     frame.color[40 * 81 + 40] = Rgb::ONE;
     let with = |method| frame.filter(&FilterParams { kernel: Kernel::Ggx, method, ..FilterParams::default() });
-    let (full, four) = (with(Method::Full), with(Method::FourPass));
+    let (full, four) = (with(Convolution::Full), with(Convolution::FourPass));
     let difference: f32 = full.iter().zip(&four).map(|(a, b)| (a.x - b.x).abs()).sum();
     // The mixture misplaces 3 % of the volume; its Gaussians go on past the tail's end.
     assert!(difference < 0.1, "{difference}");
     let far = 40 * 81 + 40 + 10;
-    let thin = frame.filter(&gaussian(Method::Full))[far].x;
+    let thin = frame.filter(&gaussian(Convolution::Full))[far].x;
     assert!(four[far].x > 2.0 * thin, "{} {thin}", four[far].x);
 }
 

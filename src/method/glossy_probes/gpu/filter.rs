@@ -6,7 +6,7 @@ use crate::gpu::commands::Commands;
 use crate::gpu::kernel::{FAR, Kernel, WORKGROUP, groups, shader};
 use crate::gpu::view::Guides;
 use crate::method::glossy_probes::filter::four_pass::{MIN_SIGMA, STEPS, gaussians};
-use crate::method::glossy_probes::filter::{FilterInput, FilterParams, Method};
+use crate::method::glossy_probes::filter::{Convolution, FilterInput, FilterParams};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4, Vec4Swizzles};
@@ -67,9 +67,9 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Compiles it. Errors for [`Method::Full`], which the GPU lacks.
+    /// Compiles it. Errors for [`Convolution::Full`], which the GPU lacks.
     pub fn new(gpu: Arc<Gpu>, params: &FilterParams) -> Result<Self> {
-        if params.method == Method::Full {
+        if params.method == Convolution::Full {
             return Err(Error::Request("filter.method full: the GPU has the passes alone; use --device cpu".into()));
         }
         let kernel = |entry| Kernel::new(&gpu, shader!("math", "perturb", "view", "filter"), entry);
@@ -106,7 +106,7 @@ impl Filter {
     pub(crate) fn run(&self, commands: &mut Commands, planes: &Planes) -> Result<()> {
         let Planes { size, guides, gathered, covariances, scratch, glossy } = planes;
         let groups = groups(*size, WORKGROUP);
-        let passes = if self.params.method == Method::TwoPass { 2 } else { 4 };
+        let passes = if self.params.method == Convolution::TwoPass { 2 } else { 4 };
         for (number, &(share, variance)) in gaussians(self.params.kernel).iter().enumerate() {
             let params = |pass: usize| {
                 let params = Params {

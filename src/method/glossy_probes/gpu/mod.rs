@@ -11,8 +11,8 @@ pub(crate) mod probes;
 use super::GlossyProbeParams;
 use super::candidates::Candidates;
 use super::gather::Gathered;
-use super::renderer::{Buffers, Frame, nearest_probes};
-use super::wanted::Views;
+use super::renderer::{Buffers, Reprojected, nearest_probes};
+use super::wanted::Served;
 use crate::Result;
 use crate::base::clock::Clock;
 use crate::gpu::Gpu;
@@ -175,7 +175,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Renders the next frame of a path; meanwhile probes are uploaded for the one after it, where there is `next`.
-    pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore<Views>) -> Result<Frame> {
+    pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore<Served>) -> Result<Reprojected> {
         let (gpu, mut target) = (self.gpu.clone(), self.reserved(camera.size, probes.set.size)?);
         let frame = gpu.checked(|| self.passes(&mut target, camera, next, probes))??;
         self.target = Some(target);
@@ -187,8 +187,8 @@ impl<'a> Renderer<'a> {
         t: &mut Target,
         camera: &Camera,
         next: Option<&Camera>,
-        probes: &mut ProbeStore<Views>,
-    ) -> Result<Frame> {
+        probes: &mut ProbeStore<Served>,
+    ) -> Result<Reprojected> {
         let (gpu, params, eye) = (&*self.gpu, &self.params, camera.position());
         let fine = Camera { size: t.view.size, ..camera.clone() };
         let albedos = params.gather.albedo_ratio.then_some(self.roughness_scale);
@@ -251,7 +251,7 @@ impl<'a> Renderer<'a> {
         std::mem::swap(&mut t.view.guides, &mut t.last);
         t.last_camera = Some(fine);
         let passes = [clock.laps, passes].concat();
-        Ok(Frame { emission, diffuse, glossy, passes, unserved, buffers })
+        Ok(Reprojected { emission, diffuse, glossy, passes, unserved, buffers })
     }
 }
 
