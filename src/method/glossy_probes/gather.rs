@@ -76,7 +76,7 @@ pub struct GatherParams {
     pub perturb: PerturbParams,
     /// Which texels bilinear interpolation may blend.
     pub bilinear: BilinearRule,
-    /// Divide the lobe's directional albedo out of a probe's sample and multiply the view's in. *Ours*; the paper does not.
+    /// Divide the lobe's directional albedo out of a probe's sample and multiply the view's in. *Paper*: no. *Ours*: yes.
     pub albedo_ratio: bool,
 }
 

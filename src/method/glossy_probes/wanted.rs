@@ -1,6 +1,6 @@
 //! Which texels the views of a camera path fetch: a bake for that path alone can leave the others out.
 //!
-//! *Ours*. Gathering needs the geometry maps only to choose its texels, and these cost two rays a texel. So the gather runs first,
+//! *Ours*: gathering needs the geometry maps only to choose its texels, and these cost two rays a texel. So the gather runs first,
 //! on probes whose glossy map is still black, and the bake then fills just the texels that it read.
 
 use super::bake::probe_geometry;
