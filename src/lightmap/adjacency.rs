@@ -1,7 +1,7 @@
 //! Which triangles of one object meet along an edge, and whether the shading is smooth across it.
 //!
 //! Vertices are welded by position first: files repeat them along texture seams and creases.
-//! Ours: where more than two triangles share an edge (a sheet modelled with both its sides),
+//! *Ours*: where more than two triangles share an edge (a sheet modelled with both its sides),
 //! those whose normals agree best are paired, so that each side stays one surface.
 
 use crate::scene::Geometry;

@@ -1,6 +1,6 @@
 //! The atlas: every chart's place in one image, and the way from a triangle to its texels.
 //!
-//! Ours: each chart has a gutter of [`GUTTER`] texels on every side, the reach of a bilinear filter, so that
+//! *Ours*: each chart has a gutter of [`GUTTER`] texels on every side, the reach of a bilinear filter, so that
 //! no lookup inside a chart's rectangle ever reads a texel of another. Charts are stretched to whole texels,
 //! so that the border of a rectangular wall is a border between texels.
 
@@ -29,7 +29,7 @@ const MORE_TRIES: u32 = 3;
 pub struct AtlasParams {
     /// Edge of a texel, metres; by default what spends `budget`.
     pub texel: Option<f32>,
-    /// About how many texels the surfaces get in all when `texel` is not given; backs come on top. Ours: 2 million,
+    /// About how many texels the surfaces get in all when `texel` is not given; backs come on top. *Ours*: 2 million,
     /// a texel of some 8 mm in a room of 130 m² of surfaces.
     pub budget: u32,
 }

@@ -1,6 +1,6 @@
 //! The bake: the mean of E_T over the visible part of every texel, front and back.
 //!
-//! Ours: sides that face into a solid, and backs that no light reaches, are left out chart by chart. The work is one list
+//! *Ours*: sides that face into a solid, and backs that no light reaches, are left out chart by chart. The work is one list
 //! of texels in blocks of [`BLOCK`], each a function of scene, parameters and seed alone: blocks can be done in any order,
 //! by any number of threads or machines, kept, and put together later. A first pass traces a few paths a texel in full; paths
 //! of the second read diffuse light from its map, one bounce away, where the mean over many texels hides their noise.
@@ -49,7 +49,7 @@ pub(super) const SPLIT: u32 = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightMapParams {
-    /// Samples a texel. Paper, §7.2: 2048; ours by default 256.
+    /// Samples a texel. *Paper* (§7.2): 2048. *Ours*: 256.
     pub spp: u32,
     /// Texel size.
     pub atlas: AtlasParams,

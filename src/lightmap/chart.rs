@@ -1,6 +1,6 @@
 //! Charts: patches of one object that a projection onto their mean plane shows without folds.
 //!
-//! Ours: a chart grows from the largest free triangle over smooth edges, the triangle that deviates least
+//! *Ours*: a chart grows from the largest free triangle over smooth edges, the triangle that deviates least
 //! from its mean normal first, as far as [`MAX_DEVIATION_COS`]. Creases end a chart, unless the facets beside
 //! them are smaller than a texel, where the light map could not tell them apart anyway.
 //! Triangles that the mean plane shows too obliquely, or on top of others, are left to later charts;

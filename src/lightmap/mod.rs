@@ -1,6 +1,6 @@
 //! The diffuse light map, L(S|D)*DE: E_T(x) = ∫ T_in(ω) L(ω) cos θ dω over an atlas of charts.
 //!
-//! Paper: §3 and §5 take "a standard light map" as given, so everything here is *Ours*:
+//! *Paper* (§3, §5): "a standard light map" is taken as given, so everything here is *Ours*:
 //! - [`adjacency`]: which triangles of an object meet, and whether the surface is smooth there.
 //! - [`chart`]: patches that one plane shows without folds.
 //! - [`pack`] and [`atlas`]: their places in one image, with gutters.

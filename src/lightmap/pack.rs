@@ -1,7 +1,6 @@
 //! Rectangles into a strip of fixed width, lowest place first (the "skyline" heuristic).
 //!
-//! Ours: some hundred lines less than it sounds, and fast where packing crates are not: 100 k tiny
-//! rectangles take well under a second, because a skyline has at most as many steps as the strip has texels.
+//! *Ours*, as packing crates are slow on many tiny rectangles: a skyline has at most as many steps as the strip has texels.
 
 /// One step of the skyline.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Chart borders on smooth surfaces: both sides shall show the same light.
 //!
-//! Ours: along each shared edge, the bilinear lookups of both charts shall agree, while no texel moves far from what was
+//! *Ours*: along each shared edge, the bilinear lookups of both charts shall agree, while no texel moves far from what was
 //! baked. That is a sparse least-squares problem: minimise Σ (a - b)² + λ Σ (x - x₀)² over points of the seams and the
 //! texels that they touch, gutters included. Conjugate gradients solve it in a few steps, since λ bounds the condition.
 

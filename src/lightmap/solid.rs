@@ -1,6 +1,6 @@
 //! Closed surfaces whose inside nobody sees: a light map sample inside one is dark, and belongs to no picture.
 //!
-//! Ours: a solid is a connected part of an object, every edge of which joins exactly two triangles of one
+//! *Ours*: a solid is a connected part of an object, every edge of which joins exactly two triangles of one
 //! orientation, and which holds neither the sensor nor an emitter (or else the room itself would be a solid).
 //! A ray that meets the inner side of a solid first, started inside it.
 

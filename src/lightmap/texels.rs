@@ -1,6 +1,6 @@
 //! What part of each texel the surface covers, triangle by triangle, and sample points spread over that part.
 //!
-//! Ours: rasterisation is conservative (exact clipping of every triangle against every texel that it touches),
+//! *Ours*: rasterisation is conservative (exact clipping of every triangle against every texel that it touches),
 //! so a texel is sampled where the surface is, never where its centre happens to be.
 
 use super::Atlas;

@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 const EPSILON: f32 = f32::EPSILON / 2.0;
 
 /// How far off its surface a ray starts, in rounding errors of the largest coordinate of the point and of the triangle's
-/// corners. Interpolation and intersection lose about 10 of the latter together. Ours: Mitsuba moves by 1500 of
+/// corners. Interpolation and intersection lose about 10 of the latter together. *Ours*: Mitsuba moves by 1500 of
 /// (1 + largest coordinate), which depends on the unit of length and lets light under the feet of furniture.
 const OFFSET_ULPS: (f32, f32) = (256.0, 32.0);
 

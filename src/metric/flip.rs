@@ -1,8 +1,8 @@
 //! FLIP: the difference that a viewer flipping between two images sees.
 //!
-//! Paper: Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images". The authors' own code does the work, at
+//! *Paper* (Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images"): the authors' own code does the work, at
 //! its default of 67 pixels a degree (a 0.7 m wide 4K screen seen from 0.7 m).
-//! Ours: display values are rounded to 8 bits, as on a screen.
+//! *Ours*: display values are rounded to 8 bits, as on a screen.
 
 use super::Raster;
 

@@ -2,7 +2,7 @@
 
 use crate::base::math::Rgb;
 
-/// What keeps the relative error of black reference pixels finite. Ours: a hundredth, as renderers commonly take.
+/// What keeps the relative error of black reference pixels finite. *Ours*: a hundredth, as renderers commonly take.
 pub const REL_MSE_EPSILON: f64 = 1e-2;
 
 /// Root of the mean squared difference over pixels and channels.

@@ -1,7 +1,7 @@
 //! Structural similarity.
 //!
-//! Paper: Wang et al. 2004, an 11x11 Gaussian window of sigma 1.5, K1 = 0.01, K2 = 0.03, data range 1. Population statistics.
-//! Reading: borders mirror (the edge pixel twice), and the mean leaves out the outermost 5 pixels, where the window reaches
+//! *Paper* (Wang et al. 2004): an 11x11 Gaussian window of sigma 1.5, K1 = 0.01, K2 = 0.03, data range 1. Population statistics.
+//! *Reading*: borders mirror (the edge pixel twice), and the mean leaves out the outermost 5 pixels, where the window reaches
 //! over the edge: the choices of scikit-image's `structural_similarity(gaussian_weights=True, sigma=1.5,
 //! use_sample_covariance=False, data_range=1)`, which the tests compare with.
 

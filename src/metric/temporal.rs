@@ -1,6 +1,6 @@
 //! How much a method's error changes from frame to frame: what flickers and swims, of which a still frame tells nothing.
 //!
-//! *Ours*. With the display values a of the image and b of the reference, the mean over pixels and channels of
+//! *Ours*: with the display values a of the image and b of the reference, the mean over pixels and channels of
 //! |(a₁ - b₁) - (a₀ - b₀)| for two consecutive frames 0 and 1. An error that stays where it is in the image counts nothing; noise, which is
 //! new in every frame, counts in full, and that of the reference with it.
 

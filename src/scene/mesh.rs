@@ -33,7 +33,7 @@ impl Mesh {
 /// Positions go through `to_world`, normals through its inverse transpose. Without `face_normals`, a mesh without normals
 /// gets smooth ones from its placed triangles. `flip_normals` turns shading and geometric normals round.
 ///
-/// Ours: where the file's normals are used and `to_world` mirrors, the winding is reversed too, so that geometric and
+/// *Ours*: where the file's normals are used and `to_world` mirrors, the winding is reversed too, so that geometric and
 /// shading normals stay on one side. Mitsuba leaves the two opposed, but only ever asks the shading normal for a side.
 /// Triangles without area keep their index; the BVH leaves them out.
 #[expect(clippy::too_many_arguments, reason = "one call a shape plugin; the arguments are a shape's own properties")]

@@ -1,6 +1,6 @@
 //! Vertex normals that a file does not give.
 //!
-//! Ours, as Mitsuba: a vertex's normal is the mean of its triangles' normals, weighted by the angle that each triangle has
+//! *Ours*, as Mitsuba: a vertex's normal is the mean of its triangles' normals, weighted by the angle that each triangle has
 //! there (Thürmer and Wüthrich 1998), so that it does not depend on how a flat polygon was cut.
 
 use glam::{Mat3, Vec3};

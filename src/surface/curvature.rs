@@ -1,9 +1,9 @@
 //! Principal curvatures and directions at every vertex of the scene.
 //!
-//! Paper: §4.3. Per object: tessellate what is flat and coarse, estimate by Meyer et al. 2003, average with the neighbours whose
+//! *Paper* (§4.3): for each object, tessellate what is flat and coarse, estimate by Meyer et al. 2003, average with the neighbours whose
 //! normals lie within 40 degrees, weighted by the normals' dot product and leaving boundary vertices out, hand back to the scene's vertices.
-//! Reading: what is averaged is the curvature tensor, the vertex's own with weight 1; a vertex on the boundary takes its neighbours' mean.
-//! Ours: a boundary vertex without an inner neighbour takes its curvature from the normals ([`meyer::from_normals`]);
+//! *Reading*: what is averaged is the curvature tensor, the vertex's own with weight 1; a vertex on the boundary takes its neighbours' mean.
+//! *Ours*: a boundary vertex without an inner neighbour takes its curvature from the normals ([`meyer::from_normals`]);
 //! objects with face normals are sets of planes, since a plane is what their mirror rays see: curvature 0.
 //!
 //! In: triangles with unit vertex normals. Out: curvature in 1/m, signed as [`Curvature`] says, relative to the vertex normal.
@@ -22,11 +22,10 @@ use rayon::prelude::*;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CurvatureParams {
-    /// Vertices at one place are one vertex if their normals differ by less than this, degrees. Ours: enough for the rounding of files,
-    /// less than the creases and facets that a file splits on purpose: mirror rays see no bend there (2 to 4 % of the vertices of
-    /// living rooms and bathrooms are split by 10 to 40 degrees).
+    /// Vertices at one place are one vertex if their normals differ by less than this, degrees. *Ours*: enough for the rounding of files,
+    /// less than the creases and facets that a file splits on purpose: mirror rays see no bend there.
     pub weld_degrees: f32,
-    /// Neighbours are averaged if their normals differ by less than this, degrees. Paper: 40 (§4.3).
+    /// Neighbours are averaged if their normals differ by less than this, degrees. *Paper* (§4.3): 40.
     pub regularize_degrees: f32,
     /// Refinement of coarse flat parts.
     pub tessellation: TessellationParams,

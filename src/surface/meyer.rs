@@ -4,10 +4,10 @@
 //! the Gaussian curvature from the angle that is missing about the vertex,
 //!   2 kH n = 1/(2A) Σ (cot α + cot β)(x - x_j),   kG = (2π - Σ θ) / A,   k = kH ± √(kH² - kG),
 //! and the directions from the tensor with trace 2 kH that fits the normal curvatures of the edges, k_j = 2 (x - x_j)·n / |x - x_j|².
-//! Ours: a ring that is plane to within rounding has curvature 0 exactly; |k| is at most twice the largest |k_j|
+//! *Ours*: a ring that is plane to within rounding has curvature 0 exactly; |k| is at most twice the largest |k_j|
 //! (noise in the missing angle of slivers knows no bound); edge weights of obtuse triangles are not let below 0.
 //!
-//! [`from_normals`] is for vertices without a whole ring (Ours): the tensor that turns the vertex normals along the edges
+//! [`from_normals`] is for vertices without a whole ring (*Ours*): the tensor that turns the vertex normals along the edges
 //! of the triangles about it (Rusinkiewicz 2004). It sees curvature where a strip of quads has no inner vertex.
 
 use super::paraboloid::Curvature;

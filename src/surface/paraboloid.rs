@@ -1,6 +1,6 @@
 //! The local second-order model of a reflector.
 //!
-//! Paper: §4.3, "the principal curvatures allow us to locally represent the surface by a paraboloid using the curvature
+//! *Paper* (§4.3): "the principal curvatures allow us to locally represent the surface by a paraboloid using the curvature
 //! directions as axes".
 //!
 //! Sign: a curvature is positive where the surface bends away from its normal (a sphere with outward normals has

@@ -1,10 +1,10 @@
 //! Refines large flat triangles, so that the discrete operator finds vertices with a whole ring about them.
 //!
-//! Paper: §4.3, "we tessellate large planar objects with only a few large triangles" (Fig. 5b, d); the text gives no numbers.
-//! Ours: a triangle is flat if its vertex normals are its own normal; the edges of flat triangles are halved, again and again,
+//! *Paper* (§4.3): "we tessellate large planar objects with only a few large triangles" (Fig. 5b, d); the text gives no numbers.
+//! *Ours*: a triangle is flat if its vertex normals are its own normal; the edges of flat triangles are halved, again and again,
 //! while they are long against their object. Halving works on edges, so the mesh stays without cracks, and the new vertices
 //! lie on the surface. Straight edges of curved surfaces (a cylinder's) stay: the blunt triangles that cutting them
-//! leaves cost the estimate more than the longer ring does (tried: 11 % low).
+//! leaves cost the estimate more than the longer ring does.
 
 use super::weld::WeldedMesh;
 use glam::Vec3;

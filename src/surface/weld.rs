@@ -1,7 +1,7 @@
 //! One object as a mesh without seams, and who touches whom in it.
 //!
 //! Files split vertices where texture coordinates or normals jump; a discrete operator needs the surface whole.
-//! Ours: vertices at exactly the same position are one if their normals agree to within a few degrees; a crease stays split, and is
+//! *Ours*: vertices at exactly the same position are one if their normals agree to within a few degrees; a crease stays split, and is
 //! then a boundary of the mesh.
 
 use crate::scene::{Geometry, Object};

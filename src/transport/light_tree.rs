@@ -1,7 +1,7 @@
 //! A hierarchy of emitters, descended at random by how much each half can send to a point.
 //!
 //! Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting": bounds of position, of
-//! direction and of power, put together by the surface area orientation heuristic. Ours: no splitting, one emitter a
+//! direction and of power, put together by the surface area orientation heuristic. *Ours*: no splitting, one emitter a
 //! descent; and a surface's back counts as [`BACK`], not as nothing, so that no scattering model is ever cut off.
 
 use bytemuck::{Pod, Zeroable};

@@ -1,7 +1,7 @@
 //! The path tracer, with the split of the first vertex into its diffuse and non-diffuse lobes.
 //!
 //! At each vertex one emitter sample and one BSDF sample, combined by the power heuristic (Veach 1997, §9.2), as Mitsuba's
-//! `path`. Ours: the two halves of the first vertex are two paths of their own that share the camera ray, so one pass gives all
+//! `path`. *Ours*: the two halves of the first vertex are two paths of their own that share the camera ray, so one pass gives all
 //! layers, each with the noise of a render of that layer alone; and the roulette's throughput leaves the first vertex's
 //! weight out, so that a weak lobe's layer is as well sampled as a strong one's.
 
@@ -22,7 +22,7 @@ const ROULETTE_CAP: f32 = 0.98;
 
 /// How much likelier than its throughput a path lives. *Ours*: with 1, Mitsuba's, every survivor weighs as much as a path that
 /// has lost nothing, and where light is found late (caustics, bright corners) few heavy paths make most of the noise. Starting
-/// earlier pays for it: a third less time to equal error on each of four scenes.
+/// earlier pays for it.
 const ROULETTE_MERCY: f32 = 4.0;
 
 /// Depth and termination.

@@ -1,6 +1,6 @@
 //! Sample points: Owen-scrambled Sobol, one decorrelated stream a pixel or texel.
 //!
-//! Ours: dimensions come in sets of four (Burley's padding: the first four Sobol dimensions again and again, each set
+//! *Ours*: dimensions come in sets of four (Burley's padding: the first four Sobol dimensions again and again, each set
 //! scrambled and shuffled with a seed of its own), so that a set is well distributed in all its projections and sets are
 //! independent. A path draws two sets a vertex; past [`SOBOL_SETS`], where stratification no longer shows, sets are plain
 //! hashes, which cost a third.

@@ -1,6 +1,6 @@
 //! What mirrors show of lamps, of the environment and of diffuse light: looked up along the mirror ray.
 //!
-//! *Ours*. A lobe without width shows a single point, and the mirror ray ends there: its emission is known, and the light map knows its
+//! *Ours*: a lobe without width shows a single point, and the mirror ray ends there: its emission is known, and the light map knows its
 //! diffuse light, without the texels of a probe in between; where it is a perfect mirror too, the ray goes on. Probes are left with what
 //! rough surfaces in the mirror reflect: a bake tells of its texels that see a perfect mirror what the same lookup finds along their own
 //! mirror ray; that is taken out before the gather, and the view's pixels get what is found along theirs after the filter.

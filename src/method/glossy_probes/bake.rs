@@ -38,7 +38,7 @@ pub struct ProbeBakeParams {
     /// what the paths have integrated the filter need not guess, and what it then blurs is noise (`footprint.roughness_scale`).
     pub roughness_scale: f32,
     /// Spread the samples over the texel's solid angle, as far as it shows the reflector that its centre shows, in place of
-    /// sending all through the centre. *Ours*. A spread texel mixes what a mirror shows on both sides of an edge, and the gather
+    /// sending all through the centre. *Ours*: a spread texel mixes what a mirror shows on both sides of an edge, and the gather
     /// then finds a bright colour where the geometry maps promise a dark surface; so it is off by default.
     pub spread: bool,
 }

@@ -1,8 +1,8 @@
 //! Numeric Cholesky factorisation of a sparse matrix whose pattern is known, column by column from the left (George and Liu
 //! 1981, §5.4).
 //!
-//! Ours, on nalgebra-sparse's analysis: its own numeric phase reads every column from the top for each column that it changes.
-//! Following each from where it stands takes less than half the time, and two of these are most of a parameterisation.
+//! *Ours*, on nalgebra-sparse's analysis: its own numeric phase reads every column from the top for each column that it changes.
+//! Following each from where it stands is much faster, and two factorisations are most of a parameterisation's time.
 
 use nalgebra_sparse::factorization::CscSymbolicCholesky;
 use nalgebra_sparse::pattern::SparsityPattern;

@@ -1,8 +1,8 @@
 //! Antialiasing by coverage: pixels across which an edge runs are averaged over more rays, each of which takes its glossy radiance from the
 //! sub-pixels at hand that show the same.
 //!
-//! *Ours*. Over half of the method's squared error lies along the edges of reflectors and of what mirrors show, where a few rays a pixel
-//! alias. More rays through all passes cure it (three quarters of the error at 4 x 4 in place of 2 x 2), at four times the price; these are
+//! *Ours*: over half of the method's squared error lies along the edges of reflectors and of what mirrors show, where a few rays a pixel
+//! alias. More rays through all passes cure it, at a price that grows with their number; these are
 //! asked only what they see, and only where it matters. Emission and the diffuse layer are the rays' own.
 
 use crate::Result;

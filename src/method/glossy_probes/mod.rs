@@ -24,6 +24,7 @@ pub mod quasi_harmonic;
 pub mod renderer;
 pub mod resmap;
 mod row;
+pub mod search;
 pub mod seen;
 pub mod wanted;
 
@@ -46,8 +47,8 @@ pub struct GlossyProbeParams {
     pub supersample: u32,
     /// §5.2.
     pub gather: GatherParams,
-    /// Perfect mirrors take the light that the light map knows along the mirror ray, and the rest from probes. *Ours*; the paper takes
-    /// all from probes.
+    /// Perfect mirrors take the light that the light map knows along the mirror ray, and the rest from probes. *Paper*: no.
+    /// *Ours*: yes.
     pub mirror_light: bool,
     /// §6.1; `None` leaves the gathered colours unfiltered.
     pub footprint: Option<FootprintParams>,

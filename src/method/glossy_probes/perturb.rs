@@ -1,6 +1,6 @@
 //! Where a reflector shows a point to another eye: specular path perturbation.
 //!
-//! Paper: §5.1, Δx = J Δp + [Δp]ᵀ H [Δp], after Chen and Arvo 2000. Reading: their H is the second derivative, so the series needs
+//! *Paper* (§5.1): Δx = J Δp + [Δp]ᵀ H [Δp], after Chen and Arvo 2000. *Reading*: their H is the second derivative, so the series needs
 //! the factor 1/2, which lives in [`Perturbation::reflection_point`] (`0.5 * second`).
 //!
 //! Derivation. Near x the reflector is s(u) = x + T u - n uᵀKu / 2 with T = (d1, d2) and K = diag(k1, k2). Of all paths p-s-q the light takes
@@ -17,12 +17,12 @@
 //!
 //! G⁻¹ and the P are made once a pixel; each probe then costs one contraction of H with its Δp, less than H's own entries would.
 //!
-//! Ours: from the series' estimate, a few steps of Newton's method on the paraboloid itself, F(u, p') = 0, with
+//! *Ours*: from the series' estimate, a few steps of Newton's method on the paraboloid itself, F(u, p') = 0, with
 //!   ∂F/∂u = ∂sᵀ(P_p + P_q) ∂s + n·(e_p + e_q) K,   ∂s = T - n (Ku)ᵀ,
 //! of whose points the one that comes nearest to F = 0 is taken: the series alone is off by several texels where probes are
 //! farther from the eye than the reflector's radius.
 //!
-//! Ours: the plane's share of the series is summed in closed form (it is geometric: dividing by 1 + ε, ε the eye's rise against
+//! *Ours*: the plane's share of the series is summed in closed form (it is geometric: dividing by 1 + ε, ε the eye's rise against
 //! the heights of both ends), so that flat reflectors are exact for any Δp; x' lies on the paraboloid; a series that does not settle
 //! (the second-order part longer than the first) is cut there; where a concave reflector focuses the eye onto q
 //! (G singular), and for broken input, the reflector counts as a plane.
@@ -49,15 +49,15 @@ pub enum Order {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PerturbParams {
-    /// Order of the series. Paper: second.
+    /// Order of the series. *Paper*: second.
     pub order: Order,
-    /// Sum the plane's share of the series in closed form. Paper: no.
+    /// Sum the plane's share of the series in closed form. *Paper*: no.
     pub exact_plane: bool,
-    /// Longest second-order part of the curvature's share, as a multiple of the first-order step. Paper: no limit.
+    /// Longest second-order part of the curvature's share, as a multiple of the first-order step. *Paper*: no limit.
     pub second_order_limit: f32,
     /// |det G| as a fraction of the plane's below which the reflector focuses too well and counts as a plane.
     pub min_focus: f32,
-    /// Newton steps from there, on curved reflectors. Paper: none. Ours: 3.
+    /// Newton steps from there, on curved reflectors. *Paper*: none. *Ours*: 3.
     #[serde(default)]
     pub newton: u32,
 }

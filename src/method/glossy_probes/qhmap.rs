@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QhmapParams {
-    /// Width and height of the probes, texels. §7: 1024 x 512.
+    /// Width and height of the probes, texels. *Paper* (§7): 1024 x 512.
     pub size: [u32; 2],
     /// Added to m, in units of its mean: bounds how far directions without need are compressed, and keeps the system
     /// regular where m is 0. *Ours*.

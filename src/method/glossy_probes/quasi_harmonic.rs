@@ -4,8 +4,7 @@
 //! Both coordinates of the forward map f solve div(C ∇f) = 0 on the mesh whose quads are the texels of m.
 //!
 //! *Reading*: the paper asks for C = m I, "scaling proportional to m". Along one axis the equation says f' ∝ 1/C, so for a
-//! map from directions to texels that choice starves what m favours (log-density against log m correlates at −.98). The
-//! sentence decides: C = 1/m (+.95).
+//! map from directions to texels that choice starves what m favours. The sentence decides: C = 1/m.
 //!
 //! *Reading*: "boundary vertices move on the boundary, left and right in step". The domain is a cylinder: u has a jump of 1
 //! across the seam and is free at the poles, v is held at the poles and is the same on both sides of the seam. The seam

@@ -48,18 +48,18 @@ impl Smoothness {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ResmapParams {
-    /// Width and height, texels. §4.2.1: 256 x 128.
+    /// Width and height, texels. *Paper* (§4.2.1): 256 x 128.
     pub size: [u32; 2],
-    /// Edge N of the DCT's window, texels. §4.2.1: 16.
+    /// Edge N of the DCT's window, texels. *Paper* (§4.2.1): 16.
     pub dct_size: u32,
-    /// Exponent k of the frequency weight ‖(p, q)‖ᵏ. §4.2.1: 5.
+    /// Exponent k of the frequency weight ‖(p, q)‖ᵏ. *Paper* (§4.2.1): 5.
     pub frequency_exponent: f32,
-    /// Sigma of the Gaussian that blurs m, texels. §4.2.1: 5.
+    /// Sigma of the Gaussian that blurs m, texels. *Paper* (§4.2.1): 5.
     pub blur_sigma: f32,
     /// Smallest facing cosine that m_size divides by. *Ours*: lower lets silhouettes starve the rest of the probe,
     /// higher leaves grazing floors without texels.
     pub facing_min: f32,
-    /// m_mat. §4.2.1 names it only.
+    /// m_mat. *Paper* (§4.2.1): named only.
     pub smoothness: Smoothness,
 }
 

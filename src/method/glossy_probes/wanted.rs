@@ -1,12 +1,13 @@
 //! Which texels the views of a camera path fetch: a bake for that path alone can leave the others out.
 //!
-//! *Ours*. Gathering needs the geometry maps only to choose its texels, and these cost two rays a texel. So the gather runs first,
+//! *Ours*: gathering needs the geometry maps only to choose its texels, and these cost two rays a texel. So the gather runs first,
 //! on probes whose glossy map is still black, and the bake then fills just the texels that it read.
 
 use super::bake::probe_geometry;
 use super::candidates::NearCandidates;
-use super::gather::{GatherParams, best_samples, footprint_texels, tiles};
+use super::gather::{GatherParams, footprint_texels};
 use super::renderer::nearest_probes;
+use super::search::{best_samples, tiles};
 use crate::Result;
 use crate::base::progress::Progress;
 use crate::probe::file::Probe;

@@ -34,12 +34,12 @@ const MOST_BOUNCES: u32 = 1 << 12;
 pub struct LightmapRtParams {
     /// N x N rays a pixel through the G-buffer.
     pub supersample: u32,
-    /// Rays that leave the first vertex. Paper: 4.
+    /// Rays that leave the first vertex. *Paper*: 4.
     pub samples: u32,
-    /// Rays in a row, the first included. Paper: 3.
+    /// Rays in a row, the first included. *Paper*: 3.
     pub bounces: u32,
     /// Sample emitters at each vertex, and combine both by multiple importance sampling. The last hit then scatters once more, towards
-    /// emitters alone. Paper: no.
+    /// emitters alone. *Paper*: no.
     pub next_event: bool,
 }
 

@@ -1,8 +1,8 @@
 //! The filter as one-dimensional passes.
 //!
-//! Paper: §6.3. Passes 1 and 3 run along the first principal direction of each pixel's covariance, 2 and 4 along the second, with
+//! *Paper* (§6.3): passes 1 and 3 run along the first principal direction of each pixel's covariance, 2 and 4 along the second, with
 //! halved covariances, so that a neighbour round the corner of an edge is still reached.
-//! Ours: a pass steps along the axis nearest its direction and reads the two pixels nearest the line, each with its own range weight.
+//! *Ours*: a pass steps along the axis nearest its direction and reads the two pixels nearest the line, each with its own range weight.
 
 use super::{Convolution, FilterInput, FilterParams, Kernel, NOT_GLOSSY, confidence, principal};
 use crate::base::math::{Rgb, floor};

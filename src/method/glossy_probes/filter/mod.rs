@@ -1,10 +1,10 @@
 //! The glossy filter: blurs the gathered colours by what the probes lack of the material's roughness.
 //!
-//! Paper: §6.2, Eq. 4, each pixel a mean of its neighbourhood with the weights Gaussian · range · 1/E; §6.3, the same by four passes along
+//! *Paper* (§6.2, Eq. 4; §6.3): each pixel a mean of its neighbourhood with the weights Gaussian · range · 1/E, or the same by four passes along
 //! the principal directions of each pixel's covariance ([`four_pass`]).
-//! Reading: the confidence 1/E goes with the colour through the passes and is divided out at the end (normalised convolution, Knutsson and
+//! *Reading*: the confidence 1/E goes with the colour through the passes and is divided out at the end (normalised convolution, Knutsson and
 //! Westin 1993), so that it counts once; each pass is normalised by its own spatial and range weights.
-//! Ours, after measurements: E is not let below [`FilterParams::min_energy`], since one perfect sample must not outshine all others, and zero
+//! *Ours*, after measurements: E is not let below [`FilterParams::min_energy`], since one perfect sample must not outshine all others, and zero
 //! must not divide; at 3, the most that a sample of the right reflected material reaches, 1/E only tells the wrong ones. The kernel may
 //! have the tails of GGX, (1 + q)⁻², instead of a Gaussian's, which widen bright highlights too much. Normals must be closer, so that a
 //! bevel keeps its edge; the depth threshold is a little wider, for 0.2 m can cut a floor's kernel at a visible line.
@@ -54,15 +54,15 @@ pub const TAIL_END: f32 = 8.0;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FilterParams {
-    /// Spatial weights. Paper: Gaussian.
+    /// Spatial weights. *Paper*: Gaussian.
     pub kernel: Kernel,
-    /// Evaluation. Paper: four passes.
+    /// Evaluation. *Paper*: four passes.
     pub method: Convolution,
-    /// Smallest cosine between two normals that may mix, α_n. Paper: 0.8; ours, 0.98.
+    /// Smallest cosine between two normals that may mix, α_n. *Paper*: 0.8. *Ours*: 0.98.
     pub min_normal_cos: f32,
-    /// Largest difference in depth that may mix, α_d, m. Paper: 0.2; ours, 0.15.
+    /// Largest difference in depth that may mix, α_d, m. *Paper*: 0.2. *Ours*: 0.15.
     pub depth_threshold: f32,
-    /// Lower clamp of E in the confidence 1/E; very large for no confidence at all. Paper: none (a small one against 0).
+    /// Lower clamp of E in the confidence 1/E; very large for no confidence at all. *Paper*: none (a small one against 0).
     pub min_energy: f32,
     /// Radius of a Gaussian, in sigmas.
     pub radius_sigmas: f32,

@@ -1,13 +1,13 @@
 //! How wide the run-time filter must be: the image-space footprint of the GGX lobe, and what the probes have not blurred yet.
 //!
-//! Paper: §6.1. A camera looks along the normal of a plane at distance d_c; the reflected point lies on that line at distance d_r. The GGX lobe that
+//! *Paper* (§6.1): a camera looks along the normal of a plane at distance d_c; the reflected point lies on that line at distance d_r. The GGX lobe that
 //! each image point sees of it is fitted by a Gaussian; 32³ fits over alpha 0..0.5 and both distances 0.01..10 m make a table. The filter's
 //! covariance is the table's at alpha less that at the probes' alpha (Eq. 3).
 //!
 //! The table holds standard deviations at focal length 1 (tangents of angles), so that a frame's own focal length in pixels converts them, and so
 //! that interpolation is of a nearly linear function. Distances past its ends are clamped to them.
 //!
-//! Ours: probes of full roughness lack nothing of the lobe, but have noise, texels, and edges sharpened by parallax. A filter that counts
+//! *Ours*: probes of full roughness lack nothing of the lobe, but have noise, texels, and edges sharpened by parallax. A filter that counts
 //! them as baked at 0.95 takes these away, by a third of the lobe's own width, for a lobe that is wider by a twentieth.
 //!
 //! Foreshortening, derived. With the notation of [`crate::method::glossy_probes::perturb`], moving by u on the reflector tilts the half vector by G u / (2 cos θ), since G is
@@ -26,11 +26,11 @@ use crate::surface::Curvature;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Cells of the table along each axis. Paper: 32.
+/// Cells of the table along each axis. *Paper*: 32.
 const BINS: usize = 32;
-/// Largest alpha of the table. Paper: 0.5.
+/// Largest alpha of the table. *Paper*: 0.5.
 const MAX_ALPHA: f32 = 0.5;
-/// Nearest and farthest distance of the table, m. Paper: 0.01 to 10.
+/// Nearest and farthest distance of the table, m. *Paper*: 0.01 to 10.
 const DISTANCES: [f32; 2] = [0.01, 10.0];
 /// Smallest cosine of incidence that is told from grazing.
 const MIN_COS: f32 = 0.02;
@@ -70,9 +70,9 @@ pub struct FootprintParams {
     /// Fit of the table.
     pub fit: Fit,
     /// Alpha of the probes' first vertex over the material's own: the most that the filter takes them to have, whatever they were
-    /// baked at ([`Self::for_probes`]), in [0, 1]. Paper: 1, as baked; ours, 0.95.
+    /// baked at ([`Self::for_probes`]), in [0, 1]. *Paper*: 1, as baked. *Ours*: 0.95.
     pub roughness_scale: f32,
-    /// Below this d_r, the variance is scaled by d_r over it; 0: never, m. Paper: 0.5, without saying how.
+    /// Below this d_r, the variance is scaled by d_r over it; 0: never, m. *Paper*: 0.5, without saying how.
     pub small_d_r: f32,
     /// Slanted reflectors.
     pub foreshortening: Foreshortening,
@@ -244,7 +244,7 @@ fn fit_cell(alpha: f32, d_c: f32, d_r: f32, params: &FootprintParams) -> f32 {
     let lobe = |y: f32| {
         let to = |d: f32| Vec3::new(-y * d_c, 0.0, d).normalize();
         let (wi, wo) = (to(d_r), to(d_c));
-        // Ours: what a patch parallel to the reflector sends, cos (of the reflector) · cos / r² (of the patch), since the BRDF alone grows without
+        // *Ours*: what a patch parallel to the reflector sends, cos (of the reflector) · cos / r² (of the patch), since the BRDF alone grows without
         // bound towards grazing light. Small lobes do not see the difference.
         let patch = if params.fit == Fit::Moment { 1.0 } else { wi.z.powi(4) };
         ggx(alpha, wi, wo) * patch
