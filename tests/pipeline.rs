@@ -297,9 +297,9 @@ fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
     f.figures(&path_trace(&format!("-o b --spp {spp}")));
     assert!(f.refusal(&path_trace("-o d --match-time b")).contains("render them again"));
     let ulr = command("--method ulr --probes out/probes -o d --budget-ms 200");
-    assert!(f.refusal(&ulr).contains("no sample count"));
+    assert!(f.refusal(&ulr).contains("--budget-ms: --method ulr has no use for it"));
     assert!(f.refusal(&path_trace("-o d --denoise --layers full")).contains("--layers full"));
-    assert!(f.refusal(&command("--probes out/probes -o d --budget-ms 200")).contains("no sample count"));
-    assert!(f.refusal(&command("--method ulr --probes out/probes -o d --denoise")).contains("path-trace alone"));
+    assert!(f.refusal(&command("--probes out/probes -o d --budget-ms 200")).contains("--method glossy-probes has no use"));
+    assert!(f.refusal(&command("--method ulr --probes out/probes -o d --denoise")).contains("path-trace has"));
     assert!(f.refusal(&command("--method ulr --probes out/probes -o d --set supersample=0")).contains("1 to 8"));
 }

@@ -1,6 +1,6 @@
 //! What all stages of a run share: options that every stage has, the scene, and who listens.
 
-use crate::base::progress::Progress;
+use crate::base::progress::{Progress, Silent};
 use crate::exchange::{LoadOptions, load};
 use crate::gpu::{Choice, Gpu};
 use crate::scene::Scene;
@@ -15,6 +15,12 @@ pub trait Listener: Progress + Send + Sync {
     fn warn(&self, message: &str);
     /// What is done next, or was done.
     fn say(&self, line: &str);
+}
+
+/// Hears nothing.
+impl Listener for Silent {
+    fn warn(&self, _: &str) {}
+    fn say(&self, _: &str) {}
 }
 
 /// Options of every stage.

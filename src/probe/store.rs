@@ -2,7 +2,6 @@
 
 use super::file::{BakedSet, Probe};
 use super::parameter_map::{ParameterMap, map_paths};
-use crate::io::provenance::hash_file;
 use crate::io::{ExrImage, atomic};
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -34,11 +33,7 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
     /// Opens a folder that was baked from `scene`; keeps at most `capacity` probes (at least 8) in memory.
     pub fn open(folder: &Path, scene: &Scene, capacity: usize) -> Result<Self> {
         let path = folder.join(SET_FILE);
-        let text = std::fs::read_to_string(&path).map_err(|e| {
-            let hint =
-                if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
-            Error::input(&path, format!("{e}{hint}"))
-        })?;
+        let text = read_set(folder)?;
         let set: BakedSet<Served> =
             serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
         set.provenance.check_scene(&path, &scene.hash)?;
@@ -47,7 +42,7 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
         }
         Ok(Self {
             folder: folder.into(),
-            hash: hash_file(&path)?,
+            hash: blake3::hash(text.as_bytes()).to_hex().to_string(),
             set,
             triangles: scene.geometry.triangles.len(),
             materials: scene.materials.len(),
@@ -97,6 +92,20 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
     pub fn resident_bytes(&self) -> usize {
         self.resident.values().map(|(_, p)| p.bytes()).sum()
     }
+}
+
+/// The text of a folder's `set.json`.
+fn read_set(folder: &Path) -> Result<String> {
+    let path = folder.join(SET_FILE);
+    std::fs::read_to_string(&path).map_err(|e| {
+        let hint = if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
+        Error::input(&path, format!("{e}{hint}"))
+    })
+}
+
+/// Content hash of a folder's `set.json`.
+pub fn set_hash(folder: &Path) -> Result<String> {
+    Ok(blake3::hash(read_set(folder)?.as_bytes()).to_hex().to_string())
 }
 
 /// Writes `set.json`: the last step of a bake.

@@ -55,6 +55,13 @@ pub struct Buffers {
     pub covariance: Vec<[f32; 3]>,
 }
 
+impl Buffers {
+    fn of(view: &GBuffer, reflected: Vec<Reflected>, gathered: Vec<Gathered>, covariance: Vec<[f32; 3]>) -> Self {
+        let curvature = |p: &Option<Pixel>| p.as_ref().map_or([0.0; 2], |p| [p.curvature.k1, p.curvature.k2]);
+        Self { width: view.size()[0], curvature: view.pixels.iter().map(curvature).collect(), reflected, gathered, covariance }
+    }
+}
+
 /// What stays the same from frame to frame.
 pub struct Renderer<'a> {
     /// The scene.
@@ -147,14 +154,7 @@ impl<'a> Renderer<'a> {
             }
         }
         clock.lap("coverage");
-        let curvature = |p: &Option<Pixel>| p.as_ref().map_or([0.0; 2], |p| [p.curvature.k1, p.curvature.k2]);
-        let buffers = self.inspect.then(|| Buffers {
-            width: size[0],
-            curvature: view.pixels.iter().map(curvature).collect(),
-            reflected,
-            gathered,
-            covariance,
-        });
+        let buffers = self.inspect.then(|| Buffers::of(&view, reflected, gathered, covariance));
         self.previous = Some(Previous { view, glossy });
         let [emission, diffuse, glossy] = layers;
         Ok(Reprojected { emission, diffuse, glossy, passes: clock.laps, unserved, buffers })

@@ -62,7 +62,7 @@ fn parameters(options: &Options) -> Result<Value> {
 
 impl Parameters for PathTraceParams {
     fn validate(&self) -> Result<()> {
-        within("spp", self.spp, 1..=1 << 24)
+        within("--spp", self.spp, 1..=1 << 24)
     }
 }
 

@@ -183,3 +183,111 @@ fn own(variant: &Variant, stages: &[&str]) -> Option<String> {
     let safe = |c: char| if c.is_ascii_alphanumeric() || "-_.+=".contains(c) { c } else { '_' };
     (!name.is_empty()).then(|| name.chars().map(safe).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::progress::Silent;
+    use crate::gpu::Choice;
+    use crate::plan::settings::Preset;
+    use crate::plan::variant::parse_bake;
+    use glam::Vec3;
+    use std::sync::Arc;
+
+    fn context() -> Context {
+        Context::new(3, Choice::Cpu, 1.0, Vec::new(), Arc::new(Silent)).unwrap()
+    }
+
+    fn evaluate(variants: &[&str], bake: &[&str]) -> Evaluate {
+        Evaluate {
+            scene: "scene.xml".into(),
+            path: "path.json".into(),
+            output: "out".into(),
+            variants: variants.iter().map(|v| Variant::parse(v).unwrap()).collect(),
+            reference: None,
+            probes: None,
+            lightmap: None,
+            curvature: None,
+            bakes: None,
+            bake_options: bake.iter().map(|b| parse_bake(b).unwrap()).collect(),
+            frames: None,
+            settings: Preset::Draft.settings(true),
+            exposure: 0.0,
+            page_bytes: 1 << 20,
+        }
+    }
+
+    fn views() -> Vec<View> {
+        vec![View { frame: 0, camera: Camera::look_at(Vec3::ZERO, Vec3::Z, Vec3::Y, 1.0, [32, 18]) }]
+    }
+
+    fn bake_of(plan: &Plan) -> &BakeProbes {
+        let bakes = plan.bakes.iter().filter_map(|p| match &p.stage {
+            Stage::BakeProbes(bake) => Some(bake),
+            _ => None,
+        });
+        let bakes: Vec<_> = bakes.collect();
+        assert_eq!(bakes.len(), 1);
+        bakes[0]
+    }
+
+    #[test]
+    fn one_bake_has_the_texels_of_every_variant_in_any_order() {
+        let (paper, other, whole) =
+            ("paper=glossy-probes,--paper", "level=glossy-probes,gather.anchors=1", "whole=glossy-probes");
+        for variants in [[paper, other].as_slice(), &[other, paper], &[paper], &[paper, whole], &[paper, other, whole]] {
+            let evaluate = evaluate(variants, &[]);
+            let plan = evaluate.plan(&context()).unwrap();
+            plan.check_views(&views()).unwrap_or_else(|e| panic!("{variants:?}: {e}"));
+            assert!(!bake_of(&plan).paper, "the paper's choice of texels is not its roughness");
+        }
+    }
+
+    #[test]
+    fn frames_that_want_other_texels_are_refused_before_anything_is_baked() {
+        let evaluate = evaluate(&["whole=glossy-probes"], &["bake-probes:--set=gather.anchors=1"]);
+        let message = evaluate.plan(&context()).unwrap().check_views(&views()).unwrap_err().to_string();
+        assert!(message.contains("frames/whole") && message.contains("texels"), "{message}");
+    }
+
+    #[test]
+    fn options_for_a_stage_add_up() {
+        let bake = ["bake-probes:--alternative=gather.probes=1", "bake-probes:--alternative=paper", "bake-probes:--spp=8"];
+        let evaluate = evaluate(&["whole=glossy-probes"], &bake);
+        let plan = evaluate.plan(&context()).unwrap();
+        assert_eq!(bake_of(&plan).alternative, ["gather.probes=1", "paper"]);
+        assert_eq!(bake_of(&plan).spp, Some(8));
+    }
+
+    #[test]
+    fn only_what_is_read_is_planned_and_charged() {
+        let evaluate = evaluate(&["rt=lightmap-rt", "pt=path-trace", "mine=glossy-probes,--probes=mine"], &[]);
+        let plan = evaluate.plan(&context()).unwrap();
+        let planned: Vec<_> = plan.bakes.iter().map(|p| (p.stage.command(), p.users.clone())).collect();
+        assert_eq!(planned, [("curvature", vec![2]), ("bake-lightmap", vec![0, 2])]);
+        assert_eq!(plan.probes(2), Some(&"mine".into()));
+    }
+
+    #[test]
+    fn a_wrong_option_names_its_variant_before_anything_runs() {
+        for (variant, expected) in [
+            (
+                "x=path-trace,--samples=4",
+                "x: --samples: --method path-trace has no use for it; image-space-gather, lightmap-rt has",
+            ),
+            ("x=glossy-probes,gather.foo=3", "x: --set gather.foo=3: no such parameter"),
+            ("x=ulr,blend=0", "x: blend=0: expected 1 to 64"),
+            ("x=glossy-probes,--magic", "x: render-path: no option --magic"),
+            ("x=lightmap-rt,bake-lightmap:--spp=many", "bake-lightmap:--spp: --spp=many: invalid digit"),
+        ] {
+            let message = evaluate(&[variant], &[]).plan(&context()).err().unwrap().to_string();
+            assert!(message.starts_with(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_references_samples_are_its_own() {
+        let plan = evaluate(&["pt=path-trace"], &[]).plan(&context()).unwrap();
+        assert_eq!((plan.frames[0].seed, plan.reference.unwrap().seed), (3, 4));
+    }
+}

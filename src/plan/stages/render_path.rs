@@ -14,7 +14,7 @@ use crate::plan::timings::Timings;
 use crate::plan::views::{FrameList, views};
 use crate::plan::{Context, Outcome};
 use crate::probe::file::BakedSet;
-use crate::probe::store::SET_FILE;
+use crate::probe::store::{SET_FILE, set_hash};
 use crate::scene::Camera;
 use crate::surface::{CurvatureMap, curvature_file};
 use crate::transport::World;
@@ -238,7 +238,7 @@ impl RenderPath {
         let scene = &world.scene;
         let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
         if let Some(folder) = &self.probes {
-            provenance = provenance.with_input("probes", hash_file(&folder.join(SET_FILE))?);
+            provenance = provenance.with_input("probes", set_hash(folder)?);
             if method.reads.probes.is_some_and(|p| p.any_texel) {
                 warn_of_partial_set(folder, method, cx);
             }
@@ -286,5 +286,127 @@ fn warn_of_partial_set(folder: &Path, method: &Method, cx: &Context) {
             folder.display(),
             method.name
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(method: &str) -> RenderPath {
+        let row = Method::find(method).unwrap();
+        RenderPath {
+            scene: "scene.xml".into(),
+            output: "frames".into(),
+            method: Some(method.into()),
+            probes: row.uses("probes").then(|| "probes".into()),
+            lightmap: row.uses("lightmap").then(|| "lightmap.exr".into()),
+            curvature: row.uses("curvature").then(|| "curvature.exr".into()),
+            ..RenderPath::default()
+        }
+    }
+
+    #[test]
+    fn an_option_that_the_method_has_no_use_for_is_an_error_that_says_who_has() {
+        let mut refused = 0;
+        for row in METHODS {
+            for (option, value) in [
+                ("probes", Some("p")),
+                ("lightmap", Some("l")),
+                ("curvature", Some("c")),
+                ("supersample", Some("2")),
+                ("spp", Some("4")),
+                ("samples", Some("4")),
+                ("max-depth", Some("4")),
+                ("layers", Some("all")),
+                ("denoise", None),
+                ("budget-ms", Some("100")),
+                ("match-time", Some("other")),
+                ("gpu-memory", Some("1000000")),
+                ("paper", None),
+            ] {
+                let mut stage = of(row.name);
+                stage.set(&format!("--{option}"), value).unwrap();
+                let result = stage.check();
+                assert_eq!(result.is_ok(), row.uses(option), "{} --{option}: {result:?}", row.name);
+                if let Err(e) = result {
+                    refused += 1;
+                    assert!(e.to_string().starts_with(&format!("--{option}: --method {} has no use", row.name)), "{e}");
+                }
+            }
+        }
+        assert!(refused > 20);
+    }
+
+    #[test]
+    fn parameters_out_of_range_are_refused() {
+        for (method, sets) in [
+            (
+                "glossy-probes",
+                &[
+                    "supersample=0",
+                    "supersample=9",
+                    "gather.search=[]",
+                    "gather.search.0.radius=-1",
+                    "gather.search.0.radius=1000",
+                    "gather.search.0.step=-1",
+                    "gather.anchors=0",
+                    "gather.falloff=-1",
+                    "gather.falloff=1e999",
+                    "gather.probes=0",
+                    "gather.probes=9",
+                    "gather.trilinear_power=-1",
+                    "gather.perturb.newton=100000",
+                    "coverage.rays=65536",
+                    "footprint.fov_degrees=0",
+                    "footprint.roughness_scale=2",
+                    "filter.min_energy=0",
+                    "filter.radius_sigmas=0",
+                    "filter.max_radius=1e9",
+                ][..],
+            ),
+            ("ulr", &["supersample=0", "blend=0", "blend=100000", "probes=0", "angle=-1"]),
+            ("image-space-gather", &["supersample=0", "samples=0", "search_samples=0", "plane_sigma=0", "max_radius=1e9"]),
+            ("lightmap-rt", &["supersample=0", "samples=0", "bounces=0"]),
+            ("path-trace", &["levels=100", "despeckle=25", "normal_power=-1"]),
+        ] {
+            for set in sets {
+                let stage = RenderPath { denoise: method == "path-trace", set: vec![(*set).into()], ..of(method) };
+                let message = stage.check().err().unwrap_or_else(|| panic!("{method} takes {set}")).to_string();
+                assert!(message.contains("expected") || message.contains("--set"), "{message}");
+            }
+        }
+        assert!(RenderPath { spp: Some(0), ..of("path-trace") }.check().is_err());
+        assert!(
+            RenderPath { set: vec!["levels=1".into()], ..of("path-trace") }.check().is_err(),
+            "nothing to set without --denoise"
+        );
+        assert!(RenderPath { budget_ms: Some(-1.0), ..of("path-trace") }.check().is_err());
+    }
+
+    #[test]
+    fn what_a_method_does_nothing_without_is_asked_for() {
+        for (method, option, expected) in [
+            ("glossy-probes", "probes", "--method glossy-probes needs --probes DIR, written by bake-probes"),
+            ("glossy-probes", "curvature", "--method glossy-probes needs --curvature FILE, written by curvature"),
+            ("lightmap-rt", "lightmap", "--method lightmap-rt needs --lightmap FILE, written by bake-lightmap"),
+        ] {
+            let mut stage = of(method);
+            match option {
+                "probes" => stage.probes = None,
+                "curvature" => stage.curvature = None,
+                _ => stage.lightmap = None,
+            }
+            assert_eq!(stage.check().unwrap_err().to_string(), expected);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn paths_that_are_no_text_are_handed_on_as_they_are() {
+        use std::os::unix::ffi::OsStringExt;
+        let odd = std::ffi::OsString::from_vec(b"room\xff.xml".to_vec());
+        let stage = RenderPath { scene: odd.clone().into(), ..of("path-trace") };
+        assert_eq!(stage.arguments()[0], odd);
     }
 }
