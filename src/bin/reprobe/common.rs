@@ -37,6 +37,13 @@ pub struct Common {
     /// Gives a scene parameter a value: NAME=VALUE for `$NAME`
     #[arg(long = "define", short = 'D', global = true, value_name = "NAME=VALUE")]
     pub defines: Vec<String>,
+    /// Leave out what a scene asks for and is not supported, with a warning: a grey surface stands
+    /// for an unknown scattering model
+    #[arg(long, global = true)]
+    pub skip_unsupported: bool,
+    /// Take textures whose files end early as far as they go, with a warning
+    #[arg(long, global = true)]
+    pub allow_truncated: bool,
     /// The scene of the last stage: stages run in one process load it once.
     #[arg(skip)]
     opaque: Arc<SceneSlot>,
@@ -121,7 +128,12 @@ impl Common {
         if !(self.unit_scale.is_finite() && self.unit_scale > 0.0) {
             bail!("--unit-scale {}: expected a positive number", self.unit_scale);
         }
-        let mut options = LoadOptions { unit_scale: self.unit_scale, ..LoadOptions::default() };
+        let mut options = LoadOptions {
+            unit_scale: self.unit_scale,
+            skip_unsupported: self.skip_unsupported,
+            allow_truncated: self.allow_truncated,
+            ..LoadOptions::default()
+        };
         for d in &self.defines {
             let (name, value) = d.split_once('=').with_context(|| format!("--define {d}: expected NAME=VALUE"))?;
             options.defines.push((name.into(), value.into()));

@@ -214,6 +214,7 @@ impl Pipeline<'_> {
         let mut s = Stage::new(command).path(self.scene).option("--seed", common.seed);
         s = s.optional("--threads", common.threads).flag("--quiet", common.quiet);
         s = s.optional("--unit-scale", (common.unit_scale != 1.0).then_some(common.unit_scale));
+        s = s.flag("--skip-unsupported", common.skip_unsupported).flag("--allow-truncated", common.allow_truncated);
         let device = Some(&common.device).filter(|d| **d != Choice::Auto && ON_GPU.contains(&command));
         s = s.optional("--device", device);
         common.defines.iter().fold(s, |s, d| s.option("--define", d))

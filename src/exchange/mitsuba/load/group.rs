@@ -1,0 +1,74 @@
+//! Shapes of several shapes: `merge`, and `instance` of a `shapegroup`.
+//!
+//! Ours: instances are copies. Mitsuba keeps one tree a group; here each of a group's triangles is in the scene as often as the group is.
+
+use super::Builder;
+use crate::exchange::mitsuba::params::Params;
+use crate::exchange::mitsuba::tree::{Kind, MAX_DEPTH, Node};
+use crate::{Error, Result};
+use glam::DMat4;
+
+/// Most triangles that a scene with instances may have: some 20 GB.
+const MAX_TRIANGLES: usize = 50_000_000;
+
+impl<'a> Builder<'a> {
+    /// Adds a shape, or all shapes of a group.
+    pub(super) fn shapes(&mut self, node: &'a Node) -> Result<()> {
+        match node.plugin.as_str() {
+            // Seen through its instances alone.
+            "shapegroup" => Ok(()),
+            "merge" => {
+                let mut params = self.params(node);
+                let parts = params.children(Kind::Shape)?;
+                params.finish(&mut self.scene.warnings);
+                self.each(node, &parts)
+            }
+            "instance" => self.instance(node),
+            _ => self.shape(node),
+        }
+    }
+
+    fn each(&mut self, node: &'a Node, parts: &[&'a Node]) -> Result<()> {
+        if self.groups >= MAX_DEPTH {
+            return Err(node.at.error(format!("shapes are nested more than {MAX_DEPTH} deep: do they refer to themselves?")));
+        }
+        self.groups += 1;
+        let added: Vec<_> = parts.iter().map(|part| self.top_level_or_nothing(part)).collect();
+        self.groups -= 1;
+        Error::gather(added).map(|_| ())
+    }
+
+    fn instance(&mut self, node: &'a Node) -> Result<()> {
+        if self.instance.is_some() {
+            return Err(node.at.error("an instance within an instance is not supported"));
+        }
+        let mut params = self.params(node);
+        let group = match params.children(Kind::Shape)?.as_slice() {
+            [group] if group.plugin == "shapegroup" => *group,
+            found => return Err(node.at.error(format!("instance: found {} shapes, expected one shapegroup", found.len()))),
+        };
+        let to_world = params.transform("to_world")?;
+        params.finish(&mut self.scene.warnings);
+        let mut group_params = self.params(group);
+        let parts = group_params.children(Kind::Shape)?;
+        self.instance = Some(to_world);
+        let added = self.each(node, &parts);
+        self.instance = None;
+        let triangles = self.scene.geometry.triangles.len();
+        if triangles > MAX_TRIANGLES {
+            let message = format!("with this instance the scene has {triangles} triangles, expected at most {MAX_TRIANGLES}: instances are copied");
+            return Err(node.at.error(message));
+        }
+        added
+    }
+
+    /// `to_world` within the instance that is being added.
+    pub(super) fn within_instance(&self, p: &mut Params<'a>) -> Result<DMat4> {
+        Ok(self.instance.unwrap_or(DMat4::IDENTITY) * p.transform("to_world")?)
+    }
+
+    /// Whether the instance mirrors: unlike a shape's own transform, it takes the sides of a mesh with it.
+    pub(super) fn instance_mirrors(&self) -> bool {
+        self.instance.is_some_and(|m| m.determinant() < 0.0)
+    }
+}
