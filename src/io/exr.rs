@@ -134,7 +134,8 @@ impl ExrImage {
         let layers: Vec<&str> = self.channels.iter().filter_map(|(n, _)| n.strip_suffix(".R")).collect();
         let layers: Vec<&str> = layers.into_iter().filter(|l| has(&format!("{l}.G")) && has(&format!("{l}.B"))).collect();
         // The pass that Blender and others call the whole picture.
-        let whole = |l: &&&str| ["combined", "rgba", "rgb", "beauty", "color", "c"].contains(&last_part(l).to_lowercase().as_str());
+        let whole =
+            |l: &&&str| ["combined", "rgba", "rgb", "beauty", "color", "c"].contains(&last_part(l).to_lowercase().as_str());
         if let Some(layer) = layers.iter().find(whole).or(layers.first()) {
             let others = (layers.len() > 1).then(|| format!("of the layers {} \"{layer}\" is taken", layers.join(", ")));
             return Ok((self.rgb(path, layer)?, others));
@@ -213,7 +214,8 @@ impl ExrImage {
         let matrix = |primaries: [[f32; 2]; 4]| {
             primaries::to_rec709(primaries).map_err(|m| Error::input(path, format!("attribute \"chromaticities\": {m}")))
         };
-        let sparse = subsampled::read(bytes, MAX_PIXELS).map_err(|m| Error::input(path, format!("not a readable EXR file: {m}")))?;
+        let sparse =
+            subsampled::read(bytes, MAX_PIXELS).map_err(|m| Error::input(path, format!("not a readable EXR file: {m}")))?;
         if let Some(Subsampled { size: [width, height], planes, primaries }) = sparse {
             let channels = planes.into_iter().map(|(name, values)| (name, Samples::F32(values))).collect();
             let to_rec709 = primaries.map(matrix).transpose()?.flatten();

@@ -79,7 +79,9 @@ pub fn read(bytes: &[u8], most_pixels: usize) -> Result<Option<Subsampled>, Stri
             "channels" => channels = list(&mut value).unwrap_or_default(),
             "compression" => compression = value.take(1).map_or(0, |b| b[0]),
             "dataWindow" => window = value.numbers::<4>().map(|n| n.map(|u| i64::from(u as i32))),
-            "chromaticities" => primaries = value.numbers::<8>().map(|n| [0, 2, 4, 6].map(|i| [n[i], n[i + 1]].map(f32::from_bits))),
+            "chromaticities" => {
+                primaries = value.numbers::<8>().map(|n| [0, 2, 4, 6].map(|i| [n[i], n[i + 1]].map(f32::from_bits)))
+            }
             _ => {}
         }
     }
@@ -123,7 +125,14 @@ fn list(value: &mut Bytes) -> Option<Vec<Channel>> {
 }
 
 /// Reads all blocks of `lines` rows, in the order of their rows.
-fn blocks(table: &mut Bytes, bytes: &[u8], compression: u8, lines: usize, height: usize, channels: &mut [Channel]) -> Result<(), String> {
+fn blocks(
+    table: &mut Bytes,
+    bytes: &[u8],
+    compression: u8,
+    lines: usize,
+    height: usize,
+    channels: &mut [Channel],
+) -> Result<(), String> {
     const EARLY: &str = "the file ends before all its rows are there";
     for first in (0..height).step_by(lines) {
         let offset = table.numbers::<2>().ok_or(EARLY)?;
@@ -201,7 +210,9 @@ fn with_colors(mut planes: Vec<Plane>, primaries: Option<[[f32; 2]; 4]>) -> Vec<
             })
             .collect();
         planes.retain(|(n, _)| !["Y", "RY", "BY"].iter().any(|c| *n == format!("{layer}{c}")));
-        planes.extend(["R", "G", "B"].iter().enumerate().map(|(k, c)| (format!("{layer}{c}"), colors.iter().map(|v| v[k]).collect())));
+        planes.extend(
+            ["R", "G", "B"].iter().enumerate().map(|(k, c)| (format!("{layer}{c}"), colors.iter().map(|v| v[k]).collect())),
+        );
     }
     planes
 }
@@ -266,25 +277,28 @@ mod tests {
         out.extend(attribute("dataWindow", "box2i", &window));
         out.push(0);
         let lines = if compression == 3 { 16 } else { 1 };
-        let blocks: Vec<Vec<u8>> = (0..size[1]).step_by(lines).map(|first| {
-            let mut plain = Vec::new();
-            for y in first..size[1].min(first + lines as u32) {
-                for (_, s, value) in channels.iter().filter(|(_, s, _)| y % s == 0) {
-                    (0..size[0]).step_by(*s as usize).for_each(|x| plain.extend(value(x, y).to_le_bytes()));
+        let blocks: Vec<Vec<u8>> = (0..size[1])
+            .step_by(lines)
+            .map(|first| {
+                let mut plain = Vec::new();
+                for y in first..size[1].min(first + lines as u32) {
+                    for (_, s, value) in channels.iter().filter(|(_, s, _)| y % s == 0) {
+                        (0..size[0]).step_by(*s as usize).for_each(|x| plain.extend(value(x, y).to_le_bytes()));
+                    }
                 }
-            }
-            let packed = match compression {
-                0 => plain.clone(),
-                // Runs of one byte, and single bytes: not small, but as the format has it.
-                1 => prepared(&plain).iter().flat_map(|&b| [0, b]).collect(),
-                _ => {
-                    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
-                    std::io::Write::write_all(&mut encoder, &prepared(&plain)).unwrap();
-                    encoder.finish().unwrap()
-                }
-            };
-            [&first.to_le_bytes()[..], &(packed.len() as u32).to_le_bytes(), &packed].concat()
-        }).collect();
+                let packed = match compression {
+                    0 => plain.clone(),
+                    // Runs of one byte, and single bytes: not small, but as the format has it.
+                    1 => prepared(&plain).iter().flat_map(|&b| [0, b]).collect(),
+                    _ => {
+                        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+                        std::io::Write::write_all(&mut encoder, &prepared(&plain)).unwrap();
+                        encoder.finish().unwrap()
+                    }
+                };
+                [&first.to_le_bytes()[..], &(packed.len() as u32).to_le_bytes(), &packed].concat()
+            })
+            .collect();
         let mut at = out.len() + 8 * blocks.len();
         for block in &blocks {
             out.extend((at as u64).to_le_bytes());
@@ -311,7 +325,11 @@ mod tests {
                 let (r, b) = ((ry(px, py) + 1.0) * luminance, (by(px, py) + 1.0) * luminance);
                 let g = (luminance - 0.212_639 * r - 0.072_192 * b) / 0.715_169;
                 for (name, expected) in [("R", r), ("G", g), ("B", b)] {
-                    assert!((plane(name)[i] - expected).abs() < 2e-5, "{compression} {name} ({px}, {py}): {} {expected}", plane(name)[i]);
+                    assert!(
+                        (plane(name)[i] - expected).abs() < 2e-5,
+                        "{compression} {name} ({px}, {py}): {} {expected}",
+                        plane(name)[i]
+                    );
                 }
             }
             for cut in (8..bytes.len()).step_by(97) {

@@ -97,7 +97,9 @@ fn radiance_pictures_of_another_name() {
         hdr.push((exponent + 128) as u8);
     }
     let folder = Folder::new().with("sky.hdr", hdr);
-    let body = format!("<emitter type='envmap'><string name='filename' value='sky.hdr'/></emitter><shape type='rectangle'>{QUAD}</shape>");
+    let body = format!(
+        "<emitter type='envmap'><string name='filename' value='sky.hdr'/></emitter><shape type='rectangle'>{QUAD}</shape>"
+    );
     assert_mitsubas("#?RGBE", render(&folder, scene(&body).as_bytes()), [1.5490, 1.2224, 0.8920]);
 }
 

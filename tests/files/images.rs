@@ -110,7 +110,8 @@ fn infinite_texels_are_clamped_with_a_warning() {
     let scene = folder.load("<shape type='cube'/><emitter type='envmap'><string name='filename' value='sky.exr'/></emitter>");
     assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("sky.exr"), "{:?}", scene.warnings);
     // A half's sun.
-    let half = ExrImage { channels: vec![("Y".into(), reprobe::io::Samples::F16(vec![half::f16::INFINITY]))], ..ExrImage::new(1, 1) };
+    let half =
+        ExrImage { channels: vec![("Y".into(), reprobe::io::Samples::F16(vec![half::f16::INFINITY]))], ..ExrImage::new(1, 1) };
     half.write(&folder.path("h.exr")).unwrap();
     assert_eq!(read(&folder.path("h.exr"), ReadOptions::default()).unwrap().0.pixel(0, 0), Vec3::splat(65_504.0));
 }
@@ -134,7 +135,8 @@ fn compare_sees_through_primaries() {
         };
         let mut image = Image::from_channels((16, 16), SpecificChannels::rgb(color));
         let (red, green, blue) = (Vec2(0.708, 0.292), Vec2(0.17, 0.797), Vec2(0.131, 0.046));
-        image.attributes.chromaticities = wide.then_some(attribute::Chromaticities { red, green, blue, white: Vec2(0.3127, 0.329) });
+        image.attributes.chromaticities =
+            wide.then_some(attribute::Chromaticities { red, green, blue, white: Vec2(0.3127, 0.329) });
         image.write().to_file(&file).unwrap();
     };
     write("a.exr", false);

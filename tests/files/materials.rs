@@ -23,7 +23,8 @@ fn stopped(world: &World, from: f32) -> (f64, f64) {
 
 #[test]
 fn masks_stand_anywhere() {
-    let mask = |opacity: &str| format!("<bsdf type='mask'><float name='opacity' value='{opacity}'/><bsdf type='diffuse'/></bsdf>");
+    let mask =
+        |opacity: &str| format!("<bsdf type='mask'><float name='opacity' value='{opacity}'/><bsdf type='diffuse'/></bsdf>");
     let texture = "<texture type='bitmap' name='opacity'><string name='filename' value='t.png'/><boolean name='raw' value='true'/>\
         <string name='filter_type' value='nearest'/></texture>";
     let textured = format!("<bsdf type='mask'>{texture}<bsdf type='diffuse'/></bsdf>");
@@ -87,7 +88,9 @@ fn textures_within_a_checkerboard() {
 #[test]
 fn measured_metals_below_zero_load_with_a_warning() {
     let metal = |eta: &str, k: &str| {
-        format!("<bsdf type='roughconductor'><float name='alpha' value='0.3'/><rgb name='eta' value='{eta}'/><rgb name='k' value='{k}'/></bsdf>")
+        format!(
+            "<bsdf type='roughconductor'><float name='alpha' value='0.3'/><rgb name='eta' value='{eta}'/><rgb name='k' value='{k}'/></bsdf>"
+        )
     };
     let odd = square(&metal("-0.0485 0.9 1.1", "3.9 -0.0364 2.1"));
     assert_eq!(odd.warnings.len(), 2);

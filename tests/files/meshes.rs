@@ -61,10 +61,14 @@ fn ascii_ply_may_be_laid_out_in_any_way() {
         ("trailing words", format!("{plain}\n\n")),
     ] {
         let found = read_ply(&text);
-        assert_eq!((found.mesh.positions, found.mesh.uvs, found.mesh.triangles), (expected.mesh.positions.clone(), expected.mesh.uvs.clone(), expected.mesh.triangles.clone()), "{what}");
+        assert_eq!(
+            (found.mesh.positions, found.mesh.uvs, found.mesh.triangles),
+            (expected.mesh.positions.clone(), expected.mesh.uvs.clone(), expected.mesh.triangles.clone()),
+            "{what}"
+        );
     }
     let message = ply::parse(plain.replace("1 0 0", "1 o 0").as_bytes(), Path::new("a.ply")).unwrap_err().to_string();
-    assert!(message.starts_with("a.ply:12: found \"o\""), "{message}");
+    assert!(message.starts_with("a.ply:13: found \"o\""), "{message}");
 }
 
 /// Names and values: Mitsuba 3.9.1, `traverse` of the same files; its bytes are 0 to 255, ours sRGB as its 16-bit integers are.
@@ -104,7 +108,10 @@ fn backslashes_join_the_lines_of_an_obj_file() {
         joined.trim_end().to_owned() + " \\",
     ] {
         let found = obj::parse(text.as_bytes(), Path::new("a.obj")).unwrap_or_else(|e| panic!("{text}\n{e}")).mesh;
-        assert_eq!((found.positions, found.uvs, found.triangles), (expected.positions.clone(), expected.uvs.clone(), expected.triangles.clone()));
+        assert_eq!(
+            (found.positions, found.uvs, found.triangles),
+            (expected.positions.clone(), expected.uvs.clone(), expected.triangles.clone())
+        );
     }
     let message = obj::parse(b"v 0 0 0\nv 1 \\\n\\\nx 0\n", Path::new("a.obj")).unwrap_err().to_string();
     assert!(message.starts_with("a.obj:2: found \"v 1"), "{message}");
@@ -153,20 +160,27 @@ fn mesh_attributes_colour_each_shape_by_its_own_file() {
     };
     let folder = Folder::new().with("a.ply", file("1")).with("b.ply", file("0.5"));
     let attribute = |name: &str, scale: &str| {
-        format!("<bsdf type='diffuse' id='{name}'><texture type='mesh_attribute' name='reflectance'><string name='name' value='{name}'/>{scale}</texture></bsdf>")
+        format!(
+            "<bsdf type='diffuse' id='{name}'><texture type='mesh_attribute' name='reflectance'><string name='name' value='{name}'/>{scale}</texture></bsdf>"
+        )
     };
     let shape = |file: &str, id: &str, x: f32, flip: bool| {
-        format!("<shape type='ply'><string name='filename' value='{file}'/><boolean name='flip_normals' value='{flip}'/>
-            <transform name='to_world'><translate x='{x}'/></transform><ref id='{id}'/></shape>")
+        format!(
+            "<shape type='ply'><string name='filename' value='{file}'/><boolean name='flip_normals' value='{flip}'/>
+            <transform name='to_world'><translate x='{x}'/></transform><ref id='{id}'/></shape>"
+        )
     };
-    let scene = folder.load(&[
-        attribute("vertex_color", ""),
-        attribute("face_color", "<float name='scale' value='0.5'/>"),
-        shape("a.ply", "vertex_color", 0.0, false),
-        shape("b.ply", "vertex_color", 2.0, true),
-        shape("a.ply", "face_color", 4.0, false),
-        "<emitter type='constant'/>".into(),
-    ].concat());
+    let scene = folder.load(
+        &[
+            attribute("vertex_color", ""),
+            attribute("face_color", "<float name='scale' value='0.5'/>"),
+            shape("a.ply", "vertex_color", 0.0, false),
+            shape("b.ply", "vertex_color", 2.0, true),
+            shape("a.ply", "face_color", 4.0, false),
+            "<emitter type='constant'/>".into(),
+        ]
+        .concat(),
+    );
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     let world = World::new(scene);
     for (x, expected) in [(0.0, [0.5, 0.2, 0.3]), (2.0, [0.25, 0.1, 0.15]), (4.0, [0.35, 0.4, 0.45])] {
@@ -206,10 +220,19 @@ fn groups_are_seen_through_their_instances() {
             assert!(scene.geometry.area_normal(t).dot(outward) > 0.0);
         }
     }
+    // Seven tenfold references would be ten million shapes.
+    let mut bomb = String::from("<shape type='disk' id='m0'/>");
+    for i in 1..20 {
+        bomb += &format!("<shape type='merge' id='m{i}'>{}</shape>", format!("<ref id='m{}'/>", i - 1).repeat(10));
+    }
     for (body, expected) in [
+        (&*bomb, "the scene has more than 2000000 shapes"),
         ("<shape type='instance'/>", "found 0 shapes, expected one shapegroup"),
         ("<shape type='merge' id='m'><ref id='m'/></shape>", "nested more than 64 deep"),
-        ("<shape type='shapegroup' id='g'><ref id='i'/></shape><shape type='instance' id='i'><ref id='g'/></shape>", "an instance within an instance"),
+        (
+            "<shape type='shapegroup' id='g'><ref id='i'/></shape><shape type='instance' id='i'><ref id='g'/></shape>",
+            "an instance within an instance",
+        ),
     ] {
         let message = Folder::new().error(body);
         assert!(message.contains(expected), "{message}");

@@ -28,7 +28,8 @@ fn radiance(scene: &Scene) -> Vec3 {
 fn spectrum_plugins_are_their_colours() {
     let list = "<string name='values' value='0.1, 0.2, 0.6, 0.5'/>";
     let (grey, reduced, emitted) = ([0.4; 3], [0.66958, 0.36814, 0.12], [0.77313, 0.3536, 0.10355]);
-    let regular = format!("type='regular'><float name='wavelength_min' value='400'/><float name='wavelength_max' value='700'/>{list}");
+    let regular =
+        format!("type='regular'><float name='wavelength_min' value='400'/><float name='wavelength_max' value='700'/>{list}");
     let irregular = format!("type='irregular'><string name='wavelengths' value='400 500 600 700'/>{list}");
     for (spectrum, surface, light) in [
         ("type='uniform'><float name='value' value='0.4'/>", grey, grey),
@@ -64,8 +65,10 @@ fn spectra_are_referred_to_and_told_when_wrong() {
     assert_eq!(reflectance(&scene), Vec3::splat(0.25));
     let error = |spectrum: &str| Folder::new().error(&format!("{CUBE}<emitter type='constant'>\n{spectrum}</emitter>"));
     let message = error("<spectrum name='radiance' type='rainbow'/>");
-    assert!(message.contains("s.xml:2: unknown texture plugin \"rainbow\""), "{message}");
-    let message = error("<spectrum name='radiance' type='irregular'><string name='wavelengths' value='1 2 3'/><string name='values' value='1 2'/></spectrum>");
+    assert!(message.contains("s.xml:2: constant: radiance is the plugin \"rainbow\", expected a colour"), "{message}");
+    let message = error(
+        "<spectrum name='radiance' type='irregular'><string name='wavelengths' value='1 2 3'/><string name='values' value='1 2'/></spectrum>",
+    );
     assert!(message.contains("3 wavelengths and 2 values"), "{message}");
 }
 
@@ -114,9 +117,8 @@ fn json_has_what_xml_has() {
 #[test]
 fn files_are_sought_in_the_working_folder_last() {
     // The tests' working folder is the repository's root.
-    let scene = Folder::new().load(
-        "<shape type='cube'/><emitter type='envmap'><string name='filename' value='docs/images/room.jpg'/></emitter>",
-    );
+    let scene = Folder::new()
+        .load("<shape type='cube'/><emitter type='envmap'><string name='filename' value='docs/images/room.jpg'/></emitter>");
     assert!(matches!(scene.emitters[0], Emitter::Envmap { .. }));
     let message = Folder::new().error("<shape type='obj'><string name='filename' value='nowhere.obj'/></shape>");
     assert!(message.contains("looked for") && message.contains(", nowhere.obj)"), "{message}");

@@ -79,7 +79,10 @@ fn json_is_told_alike() {
         \"e\": {\"type\": \"constant\"}}";
     std::fs::write(folder.path("s.json"), text).unwrap();
     let message = load(&folder.path("s.json"), &LoadOptions::default()).unwrap_err().to_string();
-    assert!(message.contains("s.json:2: unknown bsdf plugin \"hair\"") && message.contains("s.json:3: unknown plugin"), "{message}");
+    assert!(
+        message.contains("s.json:2: unknown bsdf plugin \"hair\"") && message.contains("s.json:3: unknown plugin"),
+        "{message}"
+    );
     let options = LoadOptions { skip_unsupported: true, ..LoadOptions::default() };
     assert_eq!(load(&folder.path("s.json"), &options).unwrap().geometry.objects.len(), 1);
 }

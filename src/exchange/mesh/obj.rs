@@ -219,12 +219,7 @@ fn face(
                 .ok_or_else(|| format!("face corner \"{}\" is not made of whole numbers", shown()))?;
             let value = i64::from(value);
             if value == 0 || value < -(counts[k] as i64) {
-                return Err(format!(
-                    "index {value} in \"{}\", but {} {} lines precede it",
-                    shown(),
-                    counts[k],
-                    NAMES[k]
-                ));
+                return Err(format!("index {value} in \"{}\", but {} {} lines precede it", shown(), counts[k], NAMES[k]));
             }
             if value > highest[k].0 {
                 highest[k] = (value, line);

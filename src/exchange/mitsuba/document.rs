@@ -207,7 +207,8 @@ mod tests {
 
     #[test]
     fn what_mitsuba_passes_over_is_passed_over() {
-        let text = "\n\n<?xml version='1.0'?>\n<!DOCTYPE a [ <!ELEMENT a (b)> <!ENTITY big '&big;&big;'> ]>\n<!-- a -- b --->\n<?p q?>
+        let text =
+            "\n\n<?xml version='1.0'?>\n<!DOCTYPE a [ <!ELEMENT a (b)> <!ENTITY big '&big;&big;'> ]>\n<!-- a -- b --->\n<?p q?>
             <a x='1 < 2 & 3' y='&lt;&#65;&#x42;&big;&' x='second'><![CDATA[<no/>]]>text &big;<b z='p\nq'/></a>\n";
         let (root, _) = read(text.as_bytes()).unwrap();
         assert_eq!((root.tag.as_str(), root.line), ("a", 7));

@@ -240,7 +240,11 @@ impl<'a> Params<'a> {
 
 /// "roughplastic: alpha is a string, expected a number".
 pub fn wrong(p: &Param, node: &Node, expected: &str) -> crate::Error {
-    p.at.error(format!("{}: {} is {}, expected {expected}", node.plugin, p.name, p.value.describe()))
+    let found = match &p.value {
+        Value::Plugin(child) => format!("the plugin \"{}\"", child.plugin),
+        value => value.describe().to_owned(),
+    };
+    p.at.error(format!("{}: {} is {found}, expected {expected}", node.plugin, p.name))
 }
 
 /// A parameter as a number, where it is one.

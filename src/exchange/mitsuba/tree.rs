@@ -104,13 +104,15 @@ impl Kind {
     fn of_foreign(plugin: &str) -> Option<Self> {
         Some(match plugin {
             "bsplinecurve" | "linearcurve" | "sdfgrid" | "ellipsoids" | "ellipsoidsmesh" | "heightfield" => Self::Shape,
-            "hair" | "measured" | "measured_polarized" | "polarizer" | "retarder" | "circular" | "pplastic" | "principledthin"
-            | "difftrans" | "phong" | "ward" | "hk" | "coating" | "roughcoating" | "irawan" => Self::Bsdf,
-            "homogeneous" | "heterogeneous" | "isotropic" | "hg" | "rayleigh" | "sggx" | "tabphase" | "blendphase" | "gridvolume"
-            | "constvolume" => Self::Unsupported,
+            "hair" | "measured" | "measured_polarized" | "polarizer" | "retarder" | "circular" | "pplastic"
+            | "principledthin" | "difftrans" | "phong" | "ward" | "hk" | "coating" | "roughcoating" | "irawan" => Self::Bsdf,
+            "homogeneous" | "heterogeneous" | "isotropic" | "hg" | "rayleigh" | "sggx" | "tabphase" | "blendphase"
+            | "gridvolume" | "constvolume" => Self::Unsupported,
             "volume" | "bitmap3d" => Self::Texture,
             "directionalarea" | "volumelight" | "collimated" | "tangent" => Self::Emitter,
-            "batch" | "distant" | "irradiancemeter" | "radiancemeter" | "fluxmeter" | "mradiancemeter" | "mdistant" => Self::Sensor,
+            "batch" | "distant" | "irradiancemeter" | "radiancemeter" | "fluxmeter" | "mradiancemeter" | "mdistant" => {
+                Self::Sensor
+            }
             _ => return None,
         })
     }

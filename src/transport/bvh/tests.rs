@@ -2,7 +2,7 @@ use super::triangle::Shear;
 use super::*;
 use crate::base::math::{Rgb, direction_from_lat_long};
 use crate::material::bsdf::{Bsdf, Diffuse};
-use crate::material::{Material, Texture};
+use crate::material::{Material, Opacity, Texture};
 use crate::scene::mesh::{Mesh, append};
 use crate::scene::{Geometry, primitives};
 use glam::{Mat4, Vec2, Vec3};

@@ -107,7 +107,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let mut number = 0;
     loop {
         let Some(length) = bytes[at..].iter().position(|b| matches!(b, b'\n' | b'\r')) else {
-            let message = if number == 0 { "not a PLY file: it does not begin with \"ply\"" } else { "the PLY header has no end_header" };
+            let message =
+                if number == 0 { "not a PLY file: it does not begin with \"ply\"" } else { "the PLY header has no end_header" };
             return Err(Error::at_line(path, number + 1, message));
         };
         let line = String::from_utf8_lossy(&bytes[at..at + length]).into_owned();

@@ -247,7 +247,7 @@ mod tests {
             (text.replace("0 3 3 2 1", "0 2 3 2"), "face 1 has 2 corners"),
             (text.replace("1 1 0 255", "1 nan 0 255"), "a.ply:19: found \"nan\""),
             (text.replace("1 1 0 255", "1e39 1 0 255"), "vertex 2 is [inf, 1, 0]"),
-            (text.replace("1 1 0 255", "1 one 0 255"), "PLY"),
+            (text.replace("1 1 0 255", "1 one 0 255"), "a.ply:19: found \"one\""),
             (text.replace("property float x\n", ""), "no vertex properties"),
             (text.replace("vertex_index", "corners"), "no face property"),
             ("solid cube".into(), "PLY"),

@@ -34,7 +34,9 @@ impl<'a> Builder<'a> {
         };
         let corners = match found.is_of_faces() {
             true => Vec::new(),
-            false => self.assets.mesh(node)?.triangles.iter().map(|&[a, b, c]| if swapped { [a, c, b] } else { [a, b, c] }).collect(),
+            false => {
+                self.assets.mesh(node)?.triangles.iter().map(|&[a, b, c]| if swapped { [a, c, b] } else { [a, b, c] }).collect()
+            }
         };
         let first_triangle = self.scene.geometry.triangles.len() as u32;
         let values = found.values.iter().map(|v| v * scale).collect();

@@ -4,16 +4,24 @@
 
 use super::Builder;
 use crate::exchange::mitsuba::params::Params;
-use crate::exchange::mitsuba::tree::{Kind, MAX_DEPTH, Node};
+use crate::exchange::mitsuba::tree::{Kind, MAX_DEPTH, Node, Param, Value};
 use crate::{Error, Result};
 use glam::DMat4;
+use std::collections::BTreeMap;
 
-/// Most triangles that a scene with instances may have: some 20 GB.
+/// Most triangles that instances may add, of the files of their groups: some 10 GB.
 const MAX_TRIANGLES: usize = 50_000_000;
+
+/// Most shapes: groups that refer to groups could multiply without end.
+const MAX_SHAPES: usize = 2_000_000;
 
 impl<'a> Builder<'a> {
     /// Adds a shape, or all shapes of a group.
     pub(super) fn shapes(&mut self, node: &'a Node) -> Result<()> {
+        self.shapes += 1;
+        if self.shapes > MAX_SHAPES {
+            return Err(node.at.error(format!("the scene has more than {MAX_SHAPES} shapes")));
+        }
         match node.plugin.as_str() {
             // Seen through its instances alone.
             "shapegroup" => Ok(()),
@@ -54,12 +62,45 @@ impl<'a> Builder<'a> {
         self.instance = Some(to_world);
         let added = self.each(node, &parts);
         self.instance = None;
-        let triangles = self.scene.geometry.triangles.len();
-        if triangles > MAX_TRIANGLES {
-            let message = format!("with this instance the scene has {triangles} triangles, expected at most {MAX_TRIANGLES}: instances are copied");
-            return Err(node.at.error(message));
-        }
         added
+    }
+
+    /// An error where the copies would be too many, before the first is made.
+    pub(super) fn count_copies(&self, children: &'a [Param]) -> Result<()> {
+        let mut sizes = BTreeMap::new();
+        let (mut all, mut visited) = (0usize, 0);
+        for child in children {
+            let Value::Plugin(node) = &child.value else { continue };
+            if node.plugin != "instance" {
+                continue;
+            }
+            for group in self.params(node).children(Kind::Shape)? {
+                let size = match sizes.get(&(group as *const Node)) {
+                    Some(size) => *size,
+                    None => self.triangles(group, 0, &mut visited)?,
+                };
+                sizes.insert(group as *const Node, size);
+                all = all.saturating_add(size);
+            }
+            if all > MAX_TRIANGLES {
+                let message = format!(
+                    "with this instance the scene has {all} triangles, expected at most {MAX_TRIANGLES}: instances are copied"
+                );
+                return Err(node.at.error(message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Triangles of the files of a group.
+    fn triangles(&self, node: &'a Node, depth: usize, visited: &mut usize) -> Result<usize> {
+        *visited += 1;
+        if *visited > MAX_SHAPES {
+            return Err(node.at.error(format!("the scene has more than {MAX_SHAPES} shapes")));
+        }
+        let own = self.assets.mesh(node).map_or(0, |mesh| mesh.triangles.len());
+        let parts = if depth < MAX_DEPTH { self.params(node).children(Kind::Shape)? } else { Vec::new() };
+        parts.into_iter().try_fold(own, |sum, part| Ok(sum.saturating_add(self.triangles(part, depth + 1, visited)?)))
     }
 
     /// `to_world` within the instance that is being added.

@@ -64,7 +64,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         of_one_shape: false,
         instance: None,
         groups: 0,
+        shapes: 0,
     };
+    builder.count_copies(&children)?;
     let mut results = vec![builder.foreign(&children)];
     for child in &children {
         match &child.value {
@@ -126,6 +128,8 @@ struct Builder<'a> {
     instance: Option<DMat4>,
     /// Groups around the shape that is being added.
     groups: usize,
+    /// Shapes so far.
+    shapes: usize,
 }
 
 impl<'a> Builder<'a> {
@@ -138,7 +142,10 @@ impl<'a> Builder<'a> {
         let mut found = Vec::new();
         walk(children, &mut |node| found.extend((node.kind == Kind::Unsupported).then_some(node)));
         let told = found.into_iter().map(|node| {
-            let error = node.at.unsupported(format!("unknown plugin \"{}\": participating media and their parts are not supported", node.plugin));
+            let error = node.at.unsupported(format!(
+                "unknown plugin \"{}\": participating media and their parts are not supported",
+                node.plugin
+            ));
             self.or_left_out(Err::<(), _>(error), "it is left out").map(|_| ())
         });
         Error::gather(told.collect::<Vec<_>>()).map(|_| ())

@@ -2,12 +2,12 @@
 
 use super::Builder;
 use super::attribute::Current;
-use crate::{Error, Result};
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node};
 use crate::material::Texture;
 use crate::scene::mesh::{Mesh, append, swaps_corners};
 use crate::scene::{Emitter, primitives};
+use crate::{Error, Result};
 use glam::{DMat4, DVec3, Vec3};
 use std::sync::Arc;
 

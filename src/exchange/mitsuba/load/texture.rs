@@ -65,7 +65,10 @@ impl<'a> Builder<'a> {
                 Texture::Bitmap(Bitmap { image: self.assets.image(node)?, to_uv, nearest, wrap, scale: 1.0 })
             }
             "checkerboard" => {
-                let colors = [self.textured_within(&mut params, "color0", 0.4, depth)?, self.textured_within(&mut params, "color1", 0.2, depth)?];
+                let colors = [
+                    self.textured_within(&mut params, "color0", 0.4, depth)?,
+                    self.textured_within(&mut params, "color1", 0.2, depth)?,
+                ];
                 Texture::Checkerboard { colors: Box::new(colors), to_uv: to_uv(&mut params)? }
             }
             "mesh_attribute" => self.mesh_attribute(&mut params)?,
