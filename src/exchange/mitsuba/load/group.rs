@@ -12,16 +12,12 @@ use std::collections::BTreeMap;
 /// Most triangles that instances may add, of the files of their groups: some 10 GB.
 const MAX_TRIANGLES: usize = 50_000_000;
 
-/// Most shapes: groups that refer to groups could multiply without end.
-const MAX_SHAPES: usize = 2_000_000;
+/// Most shapes in groups, which could multiply without end by referring to groups.
+const MAX_SHAPES: usize = 1_000_000;
 
 impl<'a> Builder<'a> {
     /// Adds a shape, or all shapes of a group.
     pub(super) fn shapes(&mut self, node: &'a Node) -> Result<()> {
-        self.shapes += 1;
-        if self.shapes > MAX_SHAPES {
-            return Err(node.at.error(format!("the scene has more than {MAX_SHAPES} shapes")));
-        }
         match node.plugin.as_str() {
             // Seen through its instances alone.
             "shapegroup" => Ok(()),
@@ -41,7 +37,17 @@ impl<'a> Builder<'a> {
             return Err(node.at.error(format!("shapes are nested more than {MAX_DEPTH} deep: do they refer to themselves?")));
         }
         self.groups += 1;
-        let added: Vec<_> = parts.iter().map(|part| self.top_level_or_nothing(part)).collect();
+        let mut added = Vec::new();
+        for part in parts {
+            self.grouped += 1;
+            if self.grouped > MAX_SHAPES || self.scene.geometry.triangles.len() > MAX_TRIANGLES {
+                let most = format!("more than {MAX_SHAPES} shapes or {MAX_TRIANGLES} triangles in groups, which are copied");
+                // Alone: the groups around this one stop at once, too.
+                added = vec![Err(node.at.error(most))];
+                break;
+            }
+            added.push(self.top_level_or_nothing(part));
+        }
         self.groups -= 1;
         Error::gather(added).map(|_| ())
     }
@@ -96,7 +102,7 @@ impl<'a> Builder<'a> {
     fn triangles(&self, node: &'a Node, depth: usize, visited: &mut usize) -> Result<usize> {
         *visited += 1;
         if *visited > MAX_SHAPES {
-            return Err(node.at.error(format!("the scene has more than {MAX_SHAPES} shapes")));
+            return Err(node.at.error(format!("more than {MAX_SHAPES} shapes in groups")));
         }
         let own = self.assets.mesh(node).map_or(0, |mesh| mesh.triangles.len());
         let parts = if depth < MAX_DEPTH { self.params(node).children(Kind::Shape)? } else { Vec::new() };

@@ -64,7 +64,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         of_one_shape: false,
         instance: None,
         groups: 0,
-        shapes: 0,
+        grouped: 0,
     };
     builder.count_copies(&children)?;
     let mut results = vec![builder.foreign(&children)];
@@ -128,8 +128,8 @@ struct Builder<'a> {
     instance: Option<DMat4>,
     /// Groups around the shape that is being added.
     groups: usize,
-    /// Shapes so far.
-    shapes: usize,
+    /// Shapes in groups so far.
+    grouped: usize,
 }
 
 impl<'a> Builder<'a> {
