@@ -141,7 +141,7 @@ fn blocks(
         let [_, length] = block.numbers::<2>().ok_or(EARLY)?;
         let packed = block.take(length as usize).ok_or(EARLY)?;
         let rows: Vec<usize> = (first..height.min(first + lines)).collect();
-        let has = |c: &Channel, y: usize| y % c.sampling[1] == 0;
+        let has = |c: &Channel, y: usize| y.is_multiple_of(c.sampling[1]);
         let size = rows.iter().flat_map(|&y| channels.iter().filter(move |c| has(c, y)).map(Channel::width_bytes)).sum();
         let plain = unpack(packed, compression, size)?;
         let mut rest = plain.as_slice();
@@ -263,8 +263,11 @@ mod tests {
         out
     }
 
-    /// A file of floats: name, sampling, value at each sample by its pixel.
-    fn file(size: [u32; 2], channels: &[(&str, u32, fn(u32, u32) -> f32)], compression: u8) -> Vec<u8> {
+    /// Name, sampling, value at each sample by its pixel.
+    type Given<'a> = (&'a str, u32, fn(u32, u32) -> f32);
+
+    /// A file of floats.
+    fn file(size: [u32; 2], channels: &[Given], compression: u8) -> Vec<u8> {
         let mut list = Vec::new();
         for (name, s, _) in channels {
             list.extend([name.as_bytes(), b"\0"].concat());

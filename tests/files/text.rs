@@ -58,10 +58,10 @@ fn spectrum_plugins_are_their_colours() {
 
 #[test]
 fn spectra_are_referred_to_and_told_when_wrong() {
-    let scene = Folder::new().load(&format!(
+    let scene = Folder::new().load(
         "<spectrum type='uniform' id='u'><float name='value' value='0.25'/></spectrum>
-         <shape type='cube'><bsdf type='diffuse'><ref name='reflectance' id='u'/></bsdf></shape><emitter type='constant'/>"
-    ));
+         <shape type='cube'><bsdf type='diffuse'><ref name='reflectance' id='u'/></bsdf></shape><emitter type='constant'/>",
+    );
     assert_eq!(reflectance(&scene), Vec3::splat(0.25));
     let error = |spectrum: &str| Folder::new().error(&format!("{CUBE}<emitter type='constant'>\n{spectrum}</emitter>"));
     let message = error("<spectrum name='radiance' type='rainbow'/>");

@@ -27,11 +27,9 @@ pub fn parse(text: &[u8], path: &Path) -> Result<MeshFile> {
     for (number, line) in logical_lines(text) {
         lines.add(&line, number).map_err(|e| Error::at_line(path, number, e))?;
     }
-    for k in 0..3 {
-        let (index, line) = lines.highest[k];
-        let count = lines.counts()[k];
+    for ((name, count), (index, line)) in NAMES.iter().zip(lines.counts()).zip(lines.highest) {
         if index > count as i64 {
-            let message = format!("index {index}, but the file has only {count} {} lines", NAMES[k]);
+            let message = format!("index {index}, but the file has only {count} {name} lines");
             return Err(Error::at_line(path, line, message));
         }
     }
