@@ -15,6 +15,7 @@ struct Image {
 const CONSTANT: u32 = 0u;
 const BITMAP: u32 = 1u;
 const CHECKERBOARD: u32 = 2u;
+const CHECKERED: u32 = 3u;
 
 const REPEAT: u32 = 0u;
 const MIRROR: u32 = 1u;

@@ -35,7 +35,13 @@ fn bitmap_texel(t: u32, x: i32, y: i32) -> vec3<f32> {
     return image_pixel(image, wrapped(wrap, x, i32(image.width)), wrapped(wrap, y, i32(image.height)));
 }
 
-fn texture_eval(t: u32, uv: vec2<f32>) -> vec3<f32> {
+fn texture_eval(texture: u32, uv: vec2<f32>) -> vec3<f32> {
+    var t = texture;
+    while textures[t].kind == CHECKERED {
+        let at = texture_uv(t, uv);
+        let upper = (at - floor(at)) > vec2(0.5);
+        t = select(textures[t].image.width, textures[t].image.offset, upper.x == upper.y);
+    }
     let kind = textures[t].kind;
     if kind == CONSTANT {
         return textures[t].color0;

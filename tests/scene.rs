@@ -212,7 +212,7 @@ fn masks_become_the_materials_opacity_wherever_they_stand() {
         format!("<bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='mask'>{diffuse}</bsdf></bsdf>"),
     ] {
         let scene = with_bsdf(&text);
-        assert_eq!(scene.materials[0].opacity.as_ref().unwrap().eval(Vec2::ZERO), Vec3::splat(0.25), "{text}");
+        assert_eq!(scene.materials[0].opacity.as_ref().unwrap().eval(Vec2::ZERO, true), 0.25, "{text}");
         assert!(scene.warnings.is_empty());
     }
     assert!(with_bsdf(diffuse).materials[0].opacity.is_none());
@@ -393,7 +393,8 @@ fn bad_xml_is_told_where_and_why() {
         ("\n<emitter type='area'/>".into(), "s.xml:2: found an area emitter by itself"),
         ("<bsdf type='twosided' id='a'><ref id='a'/></bsdf>".into(), "refer to themselves"),
         (bomb, "more than 200000"),
-        (deep("<bsdf type='twosided'>", "</bsdf>"), "nested more than 64 deep"),
+        (deep("<bsdf type='twosided'>", "</bsdf>"), "nested more than 500 deep"),
+        ("<bsdf type='twosided'>".repeat(100) + &"</bsdf>".repeat(100), "nested more than 64 deep"),
         (deep("<a>", "</a>"), "s.xml"),
         ("<emitter type='constant'/>".into(), "s.xml: the scene has no triangles"),
         (
@@ -420,9 +421,6 @@ fn bad_xml_is_told_where_and_why() {
         let message = load_in(&dir, "s.xml", text, &LoadOptions::default()).err().map(|e| e.to_string()).unwrap();
         assert!(message.contains("s.xml"), "{message}");
     }
-    fs::write(dir.path().join("latin.xml"), b"<scene version='3.0.0'>\n<!-- \xe9 --></scene>").unwrap();
-    let message = load(&dir.path().join("latin.xml"), &LoadOptions::default()).unwrap_err().to_string();
-    assert!(message.contains("latin.xml:2: not UTF-8"), "{message}");
     assert!(load(Path::new("/no/such/scene.xml"), &LoadOptions::default()).unwrap_err().to_string().contains("scene.xml"));
 }
 

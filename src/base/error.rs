@@ -23,6 +23,19 @@ pub enum Error {
         /// What was found and what was expected.
         message: String,
     },
+    /// A file asks for something that this program does not have.
+    #[error("{}:{line}: {message}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// Its line, 1-based.
+        line: u32,
+        /// What was found, and what there is.
+        message: String,
+    },
+    /// Several things at once, each different from the others.
+    #[error("{} problems:\n{}", .0.len(), list(.0))]
+    Many(Vec<Error>),
     /// A parameter is out of its range, or inputs do not fit together.
     #[error("{0}")]
     Request(String),
@@ -42,8 +55,51 @@ impl Error {
         Self::Input { path: path.as_ref().into(), line, message: message.into() }
     }
 
+    /// All results, or all that went wrong: one error as it is, several as [`Error::Many`], the same one once.
+    pub fn gather<T>(results: impl IntoIterator<Item = Result<T>>) -> Result<Vec<T>> {
+        let (mut values, mut errors) = (Vec::new(), Vec::<Self>::new());
+        let mut told = std::collections::BTreeSet::new();
+        for result in results {
+            match result {
+                Ok(value) => values.push(value),
+                Err(Self::Many(several)) => errors.extend(several.into_iter().filter(|e| told.insert(e.to_string()))),
+                Err(e) => errors.extend(told.insert(e.to_string()).then_some(e)),
+            }
+        }
+        match errors.pop() {
+            None => Ok(values),
+            Some(only) if errors.is_empty() => Err(only),
+            Some(last) => {
+                errors.push(last);
+                Err(Self::Many(errors))
+            }
+        }
+    }
+
+    /// Both results, or all that went wrong.
+    pub fn both<A, B>(a: Result<A>, b: Result<B>) -> Result<(A, B)> {
+        match (a, b) {
+            (Ok(a), Ok(b)) => Ok((a, b)),
+            (Err(a), Err(b)) => Self::gather::<()>([Err(a), Err(b)]).and(Err(Self::Many(Vec::new()))),
+            (Err(e), _) | (_, Err(e)) => Err(e),
+        }
+    }
+
+    /// Whether it is only about what this program does not have.
+    pub fn is_unsupported(&self) -> bool {
+        match self {
+            Self::Unsupported { .. } => true,
+            Self::Many(several) => several.iter().all(Self::is_unsupported),
+            _ => false,
+        }
+    }
+
     /// An [`Error::Io`].
     pub fn io(path: impl AsRef<Path>, cause: std::io::Error) -> Self {
         Self::Io { path: path.as_ref().into(), cause }
     }
+}
+
+fn list(errors: &[Error]) -> String {
+    errors.iter().map(|e| format!("  {e}")).collect::<Vec<_>>().join("\n")
 }

@@ -1,9 +1,12 @@
 //! EXR images of named channels, with provenance.
 
-use super::{Provenance, atomic};
+use super::subsampled::{self, Subsampled};
+use super::{Provenance, atomic, primaries};
+use crate::base::math::Rgb;
 use crate::{Error, Result};
 use exr::prelude as e;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
+use glam::Mat3;
 use half::f16;
 use std::io::Cursor;
 use std::path::Path;
@@ -33,12 +36,14 @@ pub struct ExrImage {
     pub channels: Vec<(String, Samples)>,
     /// Where the image came from.
     pub provenance: Option<Provenance>,
+    /// What turns its colours into Rec.709, where its header names other primaries.
+    pub to_rec709: Option<Mat3>,
 }
 
 impl ExrImage {
     /// An image without channels.
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, channels: Vec::new(), provenance: None }
+        Self { width, height, channels: Vec::new(), provenance: None, to_rec709: None }
     }
 
     /// Adds a channel of floats.
@@ -62,7 +67,7 @@ impl ExrImage {
     }
 
     /// Adds `layer.R`, `layer.G`, `layer.B` (or plain `R`, `G`, `B` for an empty layer name).
-    pub fn with_rgb(mut self, layer: &str, pixels: &[crate::base::math::Rgb]) -> Self {
+    pub fn with_rgb(mut self, layer: &str, pixels: &[Rgb]) -> Self {
         for (i, c) in ["R", "G", "B"].into_iter().enumerate() {
             let name = if layer.is_empty() { c.into() } else { format!("{layer}.{c}") };
             self.channels.push((name, Samples::F32(pixels.iter().map(|p| p[i]).collect())));
@@ -110,11 +115,37 @@ impl ExrImage {
         }
     }
 
-    /// Three channels `layer.R`, `layer.G`, `layer.B` (plain `R`, `G`, `B` for an empty layer name) as colours.
-    pub fn rgb(&self, path: &Path, layer: &str) -> Result<Vec<crate::base::math::Rgb>> {
+    /// Three channels `layer.R`, `layer.G`, `layer.B` (plain `R`, `G`, `B` for an empty layer name) as colours of Rec.709.
+    pub fn rgb(&self, path: &Path, layer: &str) -> Result<Vec<Rgb>> {
         let get = |c: &str| self.f32(path, &if layer.is_empty() { c.into() } else { format!("{layer}.{c}") });
         let (r, g, b) = (get("R")?, get("G")?, get("B")?);
-        Ok(r.into_iter().zip(g).zip(b).map(|((r, g), b)| crate::base::math::Rgb::new(r, g, b)).collect())
+        let matrix = self.to_rec709.unwrap_or(Mat3::IDENTITY);
+        let color = |c: Rgb| if self.to_rec709.is_some() { matrix * c } else { c };
+        Ok(r.into_iter().zip(g).zip(b).map(|((r, g), b)| color(Rgb::new(r, g, b))).collect())
+    }
+
+    /// The image that the file is of: `R`, `G`, `B`; else the colours of a layer; else luminance, or the one channel that there is, as
+    /// grey. Also a word of the layers that were passed over, where several would do.
+    pub fn picture(&self, path: &Path) -> Result<(Vec<Rgb>, Option<String>)> {
+        let has = |name: &str| self.channels.iter().any(|(n, _)| n == name);
+        if has("R") && has("G") && has("B") {
+            return Ok((self.rgb(path, "")?, None));
+        }
+        let layers: Vec<&str> = self.channels.iter().filter_map(|(n, _)| n.strip_suffix(".R")).collect();
+        let layers: Vec<&str> = layers.into_iter().filter(|l| has(&format!("{l}.G")) && has(&format!("{l}.B"))).collect();
+        // The pass that Blender and others call the whole picture.
+        let whole =
+            |l: &&&str| ["combined", "rgba", "rgb", "beauty", "color", "c"].contains(&last_part(l).to_lowercase().as_str());
+        if let Some(layer) = layers.iter().find(whole).or(layers.first()) {
+            let others = (layers.len() > 1).then(|| format!("of the layers {} \"{layer}\" is taken", layers.join(", ")));
+            return Ok((self.rgb(path, layer)?, others));
+        }
+        let mut grey = self.channels.iter().map(|(n, _)| n.as_str()).filter(|n| last_part(n) != "A");
+        let name = match (grey.next(), grey.next()) {
+            (Some(only), None) => only,
+            _ => "Y",
+        };
+        Ok((self.f32(path, name)?.into_iter().map(Rgb::splat).collect(), None))
     }
 
     /// The provenance, or an error that says that there is none.
@@ -177,8 +208,19 @@ impl ExrImage {
         meta.headers.first().map_or(Ok(None), |h| provenance(path, &h.own_attributes))
     }
 
-    fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
+    /// Reads the bytes of an EXR file; `path` is for messages.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
         let bad = |err: exr::error::Error| Error::input(path, format!("not a readable EXR file: {err}"));
+        let matrix = |primaries: [[f32; 2]; 4]| {
+            primaries::to_rec709(primaries).map_err(|m| Error::input(path, format!("attribute \"chromaticities\": {m}")))
+        };
+        let sparse =
+            subsampled::read(bytes, MAX_PIXELS).map_err(|m| Error::input(path, format!("not a readable EXR file: {m}")))?;
+        if let Some(Subsampled { size: [width, height], planes, primaries }) = sparse {
+            let channels = planes.into_iter().map(|(name, values)| (name, Samples::F32(values))).collect();
+            let to_rec709 = primaries.map(matrix).transpose()?.flatten();
+            return Ok(Self { width, height, channels, provenance: None, to_rec709 });
+        }
         let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(bad)?;
         for header in &meta.headers {
             let size = header.layer_size;
@@ -196,6 +238,9 @@ impl ExrImage {
             .map_err(bad)?;
         let layer = image.layer_data;
         let provenance = provenance(path, &layer.attributes)?;
+        let named = image.attributes.chromaticities.as_ref();
+        let named = named.map(|c| [c.red, c.green, c.blue, c.white].map(|e::Vec2(x, y)| [x, y]));
+        let to_rec709 = named.map(matrix).transpose()?.flatten();
         let channels = layer
             .channel_data
             .list
@@ -209,8 +254,12 @@ impl ExrImage {
                 (c.name.to_string(), samples)
             })
             .collect();
-        Ok(Self { width: layer.size.0, height: layer.size.1, channels, provenance })
+        Ok(Self { width: layer.size.0, height: layer.size.1, channels, provenance, to_rec709 })
     }
+}
+
+fn last_part(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
 }
 
 fn provenance(path: &Path, attributes: &e::LayerAttributes) -> Result<Option<Provenance>> {

@@ -4,7 +4,9 @@ pub mod atomic;
 pub mod exr;
 pub mod jobs;
 pub mod picture;
+pub mod primaries;
 pub mod provenance;
+mod subsampled;
 mod text;
 
 pub use exr::{ExrImage, Samples};

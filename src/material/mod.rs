@@ -2,11 +2,13 @@
 
 pub mod bsdf;
 pub mod image;
+pub mod opacity;
 pub mod surface;
 pub mod texture;
 
 use bsdf::Bsdf;
 
+pub use opacity::Opacity;
 pub use surface::Surface;
 pub use texture::Texture;
 
@@ -17,6 +19,6 @@ pub struct Material {
     pub name: String,
     /// How it scatters light.
     pub bsdf: Bsdf,
-    /// Coverage from `mask`: rays pass where a hash of the ray exceeds it. Fully opaque where `None`.
-    pub opacity: Option<Texture>,
+    /// Coverage from `mask` and `null`: rays pass where a hash of the ray exceeds it. Fully opaque where `None`.
+    pub opacity: Option<Opacity>,
 }

@@ -1,8 +1,9 @@
-//! Textures: constants, bitmaps and checkerboards.
+//! Textures: constants, bitmaps, checkerboards and what a mesh says of its vertices and faces.
 //!
 //! Lookups are Mitsuba 3's: texel (i, j) of a bitmap has its centre at ((i + 0.5) / width, (j + 0.5) / height), and
 //! row 0 of the file lies at v = 0 (OBJ files have v upwards: their loader turns it).
 
+use super::Surface;
 use super::image::Image;
 use crate::base::math::{Rgb, floor};
 use glam::{Affine2, Vec2};
@@ -17,13 +18,42 @@ pub enum Texture {
     Bitmap(Bitmap),
     /// Mitsuba's `checkerboard`.
     Checkerboard {
-        /// Colour where both or neither coordinate's fraction exceeds one half.
-        color0: Rgb,
-        /// The other colour.
-        color1: Rgb,
+        /// Colour where both or neither coordinate's fraction exceeds one half, then the other.
+        colors: Box<[Texture; 2]>,
         /// From the surface's uv to the texture's.
         to_uv: Affine2,
     },
+    /// Mitsuba's `mesh_attribute`.
+    Attribute(Arc<Attribute>),
+}
+
+/// Colours of an object's vertices or faces.
+#[derive(Debug, Clone)]
+pub struct Attribute {
+    /// The object's first triangle in the scene.
+    pub first_triangle: u32,
+    /// One value a vertex, which `corners` tell of each triangle, or one a triangle where that is empty.
+    pub values: Vec<Rgb>,
+    /// Each triangle's vertices.
+    pub corners: Vec<[u32; 3]>,
+}
+
+impl Attribute {
+    /// Value at the barycentric weights of a triangle's second and third corner.
+    fn eval(&self, triangle: u32, barycentric: Vec2) -> Rgb {
+        let Some(local) = triangle.checked_sub(self.first_triangle) else { return Rgb::ZERO };
+        let value = |i: u32| self.values.get(i as usize).copied().unwrap_or(Rgb::ZERO);
+        match self.corners.get(local as usize) {
+            Some(&[a, b, c]) => {
+                value(a) * (1.0 - barycentric.x - barycentric.y) + value(b) * barycentric.x + value(c) * barycentric.y
+            }
+            None => value(local),
+        }
+    }
+
+    fn mean(&self) -> Rgb {
+        self.values.iter().sum::<Rgb>() / self.values.len().max(1) as f32
+    }
 }
 
 /// An image with its lookup rules.
@@ -53,16 +83,23 @@ pub enum Wrap {
 }
 
 impl Texture {
-    /// Value at a surface's uv.
+    /// Value at a point of a surface.
+    pub fn at(&self, s: &Surface) -> Rgb {
+        match self {
+            Self::Constant(c) => *c,
+            Self::Bitmap(bitmap) => bitmap.eval(s.uv),
+            Self::Checkerboard { colors, to_uv } => colors[field(to_uv, s.uv)].at(s),
+            Self::Attribute(attribute) => attribute.eval(s.triangle, s.barycentric),
+        }
+    }
+
+    /// Value at a surface's uv; a mesh's own values, which uv does not tell, are taken for their mean.
     pub fn eval(&self, uv: Vec2) -> Rgb {
         match self {
             Self::Constant(c) => *c,
             Self::Bitmap(bitmap) => bitmap.eval(uv),
-            Self::Checkerboard { color0, color1, to_uv } => {
-                let uv = to_uv.transform_point2(uv);
-                let upper = (uv - uv.floor()).cmpgt(Vec2::splat(0.5));
-                if upper.x == upper.y { *color0 } else { *color1 }
-            }
+            Self::Checkerboard { colors, to_uv } => colors[field(to_uv, uv)].eval(uv),
+            Self::Attribute(attribute) => attribute.mean(),
         }
     }
 
@@ -71,7 +108,8 @@ impl Texture {
         match self {
             Self::Constant(c) => *c,
             Self::Bitmap(bitmap) => bitmap.image.mean() * bitmap.scale,
-            Self::Checkerboard { color0, color1, .. } => (*color0 + *color1) * 0.5,
+            Self::Checkerboard { colors, .. } => (colors[0].mean() + colors[1].mean()) * 0.5,
+            Self::Attribute(attribute) => attribute.mean(),
         }
     }
 
@@ -80,11 +118,22 @@ impl Texture {
         match self {
             Self::Constant(c) => Self::Constant(c * factor),
             Self::Bitmap(b) => Self::Bitmap(Bitmap { scale: b.scale * factor, ..b }),
-            Self::Checkerboard { color0, color1, to_uv } => {
-                Self::Checkerboard { color0: color0 * factor, color1: color1 * factor, to_uv }
+            Self::Checkerboard { colors, to_uv } => {
+                Self::Checkerboard { colors: Box::new(colors.map(|c| c.scaled(factor))), to_uv }
+            }
+            Self::Attribute(a) => {
+                let values = a.values.iter().map(|v| v * factor).collect();
+                Self::Attribute(Arc::new(Attribute { values, corners: a.corners.clone(), ..*a }))
             }
         }
     }
+}
+
+/// Which colour of a checkerboard lies at `uv`.
+fn field(to_uv: &Affine2, uv: Vec2) -> usize {
+    let uv = to_uv.transform_point2(uv);
+    let upper = (uv - uv.floor()).cmpgt(Vec2::splat(0.5));
+    usize::from(upper.x != upper.y)
 }
 
 impl Bitmap {
@@ -182,7 +231,10 @@ mod tests {
     /// Mitsuba 3.9.1's `checkerboard` at its default colours.
     #[test]
     fn checkerboard_boundaries_are_mitsubas() {
-        let t = Texture::Checkerboard { color0: Rgb::splat(0.4), color1: Rgb::splat(0.2), to_uv: Affine2::IDENTITY };
+        let t = Texture::Checkerboard {
+            colors: Box::new([0.4, 0.2].map(|c| Texture::Constant(Rgb::splat(c)))),
+            to_uv: Affine2::IDENTITY,
+        };
         for (u, v, expected) in [
             (0.2, 0.2, 0.4),
             (0.7, 0.2, 0.2),

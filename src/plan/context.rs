@@ -30,10 +30,8 @@ pub struct Context {
     pub seed: u32,
     /// Where to compute.
     pub device: Choice,
-    /// Multiplies all lengths of the scene, to make them metres.
-    pub unit_scale: f32,
-    /// Values of the scene's parameters.
-    pub defines: Vec<(String, String)>,
+    /// How scenes are loaded.
+    pub load: LoadOptions,
     /// Who listens.
     pub listener: Arc<dyn Listener>,
     /// The scene of the last stage: stages run in one process load it once.
@@ -53,17 +51,12 @@ pub struct Outcome {
 
 impl Context {
     /// A context; the scale must be positive.
-    pub fn new(
-        seed: u32,
-        device: Choice,
-        unit_scale: f32,
-        defines: Vec<(String, String)>,
-        listener: Arc<dyn Listener>,
-    ) -> Result<Self> {
+    pub fn new(seed: u32, device: Choice, load: LoadOptions, listener: Arc<dyn Listener>) -> Result<Self> {
+        let unit_scale = load.unit_scale;
         if !(unit_scale.is_finite() && unit_scale > 0.0) {
             return Err(Error::Request(format!("--unit-scale {unit_scale}: expected a positive number")));
         }
-        Ok(Self { seed, device, unit_scale, defines, listener, scene: Arc::default() })
+        Ok(Self { seed, device, load, listener, scene: Arc::default() })
     }
 
     /// The same with another seed.
@@ -78,8 +71,7 @@ impl Context {
 
     /// Loads a scene and tells its warnings.
     pub fn load_scene(&self, path: &Path) -> Result<Scene> {
-        let options = LoadOptions { unit_scale: self.unit_scale, defines: self.defines.clone() };
-        let scene = load(path, &options)?;
+        let scene = load(path, &self.load)?;
         scene.warnings.iter().for_each(|w| self.listener.warn(w));
         Ok(scene)
     }

@@ -121,16 +121,18 @@ impl Stage {
         list.extend(with!(self, s => s.arguments()));
         let mut option = |name: &str, value: String| list.extend([name.into(), value.into()]);
         option("--seed", cx.seed.to_string());
-        if self.reads_scene() && cx.unit_scale != 1.0 {
-            option("--unit-scale", cx.unit_scale.to_string());
+        if self.reads_scene() && cx.load.unit_scale != 1.0 {
+            option("--unit-scale", cx.load.unit_scale.to_string());
         }
         if self.uses_gpu() && cx.device != crate::gpu::Choice::Auto {
             option("--device", cx.device.to_string());
         }
         if self.reads_scene() {
-            for (name, value) in &cx.defines {
+            for (name, value) in &cx.load.defines {
                 option("--define", format!("{name}={value}"));
             }
+            let flags = [("--skip-unsupported", cx.load.skip_unsupported), ("--allow-truncated", cx.load.allow_truncated)];
+            list.extend(flags.into_iter().filter(|(_, on)| *on).map(|(flag, _)| flag.into()));
         }
         list
     }

@@ -52,7 +52,7 @@ pub fn views(
     frames: Option<&FrameList>,
 ) -> Result<Vec<View>> {
     let mut cameras = match path {
-        Some(file) => camera_path::load(file, scene.sensor.as_ref(), cx.unit_scale)?,
+        Some(file) => camera_path::load(file, scene.sensor.as_ref(), cx.load.unit_scale)?,
         None => {
             let missing = || Error::input(&scene.path, "has no sensor; give a camera path with --path");
             vec![scene.sensor.clone().ok_or_else(missing)?]

@@ -98,7 +98,8 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
 fn read_set(folder: &Path) -> Result<String> {
     let path = folder.join(SET_FILE);
     std::fs::read_to_string(&path).map_err(|e| {
-        let hint = if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
+        let hint =
+            if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
         Error::input(&path, format!("{e}{hint}"))
     })
 }

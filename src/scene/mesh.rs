@@ -47,6 +47,7 @@ pub fn append(
     material: u32,
     emitter: Option<u32>,
 ) {
+    let swaps = swaps_corners(&mesh, &to_world, flip_normals, face_normals);
     let Mesh { mut positions, normals, uvs, mut triangles } = mesh;
     let linear = Mat3::from_mat4(to_world);
     let file_normals = !face_normals && normals.len() == positions.len() && !normals.is_empty();
@@ -54,7 +55,7 @@ pub fn append(
         *p = to_world.transform_point3(*p);
     }
     let mirrored = linear.determinant() < 0.0;
-    if flip_normals != (file_normals && mirrored) {
+    if swaps {
         for t in &mut triangles {
             t.swap(1, 2);
         }
@@ -86,6 +87,12 @@ pub fn append(
         face_normals,
         has_uvs,
     });
+}
+
+/// Whether [`append`] swaps the second and third corner of the mesh's triangles.
+pub fn swaps_corners(mesh: &Mesh, to_world: &Mat4, flip_normals: bool, face_normals: bool) -> bool {
+    let file_normals = !face_normals && mesh.normals.len() == mesh.positions.len() && !mesh.normals.is_empty();
+    flip_normals != (file_normals && Mat3::from_mat4(*to_world).determinant() < 0.0)
 }
 
 /// `Err` with what is wrong where a triangle asks for a vertex that is not there, or a number is not finite.

@@ -110,7 +110,7 @@ pub fn model(name: &str) -> Bsdf {
         "roughconductor_beckmann_0.4" => roughconductor([0.4, 0.4], Beckmann, PINK),
         "roughdielectric_ggx_0.2" => roughdielectric(0.2, Ggx, grey(1.0)),
         "roughdielectric_beckmann_0.3" => roughdielectric(0.3, Beckmann, PINK),
-        "blend" => Bsdf::Blend(Blend { weight: grey(0.3), a: Box::new(diffuse()), b: Box::new(anisotropic()) }),
+        "blend" => Bsdf::Blend(Blend { weight: grey(0.3), a: Box::new(diffuse()), b: Box::new(anisotropic()), coverage: None }),
         "bumpmap_diffuse" => bump(bitmap(0.0, Wrap::Repeat, Affine2::IDENTITY), 0.4, diffuse()),
         "bumpmap_rough" => bump(bitmap(0.0, Wrap::Mirror, Affine2::IDENTITY), 0.1, model("roughconductor_ggx_0.1")),
         "bumpmap_turned" => {

@@ -67,7 +67,7 @@ fn rays_go_on_through_alpha_masks_as_on_the_cpu() {
     let Some(gpu) = gpu() else { return };
     let mut scene = room().scene;
     for material in scene.materials.iter_mut().step_by(2) {
-        material.opacity = Some(reprobe::material::Texture::Constant(Vec3::splat(0.5)));
+        material.opacity = Some(reprobe::material::Opacity::constant(0.5));
     }
     let world = World::opaque(scene).0;
     let rays = rays(&world, 20_000);

@@ -3,6 +3,7 @@
 use anyhow::{Context as _, bail};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use reprobe::base::progress::Progress;
+use reprobe::exchange::LoadOptions;
 use reprobe::gpu::Choice;
 use reprobe::plan::{Context, Listener, Outcome};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -34,6 +35,13 @@ pub struct Common {
     /// Gives a scene parameter a value: NAME=VALUE for `$NAME`
     #[arg(long = "define", short = 'D', global = true, value_name = "NAME=VALUE")]
     pub defines: Vec<String>,
+    /// Leave out what a scene asks for and is not supported, with a warning: a grey surface stands
+    /// for an unknown scattering model
+    #[arg(long, global = true)]
+    pub skip_unsupported: bool,
+    /// Take textures whose files end early as far as they go, with a warning
+    #[arg(long, global = true)]
+    pub allow_truncated: bool,
 }
 
 impl Common {
@@ -54,9 +62,14 @@ impl Common {
             let (name, value) = d.split_once('=').with_context(|| format!("--define {d}: expected NAME=VALUE"))?;
             anyhow::Ok((name.to_owned(), value.to_owned()))
         };
-        let defines = self.defines.iter().map(define).collect::<Result<_, _>>()?;
+        let load = LoadOptions {
+            unit_scale: self.unit_scale,
+            defines: self.defines.iter().map(define).collect::<Result<_, _>>()?,
+            skip_unsupported: self.skip_unsupported,
+            allow_truncated: self.allow_truncated,
+        };
         let terminal = Arc::new(Terminal { quiet: self.quiet, bar: Mutex::new(None) });
-        Ok(Context::new(self.seed, self.device.clone(), self.unit_scale, defines, terminal)?)
+        Ok(Context::new(self.seed, self.device.clone(), load, terminal)?)
     }
 
     /// Prints a result to stdout.

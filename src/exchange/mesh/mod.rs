@@ -3,3 +3,31 @@
 pub mod obj;
 pub mod ply;
 pub mod serialized;
+
+use crate::base::math::Rgb;
+use crate::scene::mesh::Mesh;
+
+/// What a mesh file holds.
+#[derive(Debug, Default, Clone)]
+pub struct MeshFile {
+    /// Its triangles.
+    pub mesh: Mesh,
+    /// Values of its vertices or faces, for `mesh_attribute` textures.
+    pub attributes: Vec<MeshAttribute>,
+}
+
+/// Values of a mesh's vertices or triangles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshAttribute {
+    /// As Mitsuba calls it: `vertex_color`, `face_color`, `vertex_` or `face_` and a name of the file's.
+    pub name: String,
+    /// One value a vertex, or one a triangle where the name begins with `face_`. A single number is all three.
+    pub values: Vec<Rgb>,
+}
+
+impl MeshAttribute {
+    /// Whether it has one value a triangle, not a vertex.
+    pub fn is_of_faces(&self) -> bool {
+        self.name.starts_with("face_")
+    }
+}

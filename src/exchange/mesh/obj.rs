@@ -1,50 +1,186 @@
-//! Wavefront OBJ, read by `tobj` after a look at each line.
+//! Wavefront OBJ.
 //!
-//! `tobj` answers errors without a line, overflows on absurd indices and splits a file at its groups; so the lines that
-//! matter (`v`, `vt`, `vn`, `f`) are checked here first and passed on alone. As in Mitsuba: one mesh a file, one vertex a
-//! distinct position/uv/normal triple, polygons as fans, and v stored as 1 - v.
-//! Ours: corners without uv in a file that has some get (0, 0), corners without normal a smooth one.
+//! As Mitsuba: one mesh a file whatever its groups, one vertex a distinct position/uv/normal triple in order of first use, polygons as
+//! fans, v stored as 1 - v, and a vertex's weight `w`, which is of rational curves and surfaces alone, passed over.
+//! Ours: corners without uv in a file that has some get (0, 0), corners without normal a smooth one; a line that ends in a backslash goes
+//! on in the next, as the format has it; colours after a position are the attribute `vertex_color`.
 
-use crate::scene::mesh::Mesh;
+use super::{MeshAttribute, MeshFile};
+use crate::scene::mesh::{Mesh, check};
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
+use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::Path;
 
+/// Stands for an index that a corner does not have.
+const NONE: u32 = u32::MAX;
+
 /// Reads an OBJ file.
-pub fn load(path: &Path) -> Result<Mesh> {
+pub fn load(path: &Path) -> Result<MeshFile> {
     parse(&std::fs::read(path).map_err(|e| Error::io(path, e))?, path)
 }
 
 /// Reads the bytes of an OBJ file; `path` is for messages.
-pub fn parse(text: &[u8], path: &Path) -> Result<Mesh> {
-    let lines = geometry_lines(text, path)?;
-    let options = tobj::LoadOptions { single_index: true, triangulate: true, ..Default::default() };
-    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut &lines[..], &options, no_materials)
-        .map_err(|e| first_bad_number(text, path).unwrap_or_else(|| Error::input(path, e.to_string())))?;
-    drop(lines);
-
-    let (any_uv, any_normal) =
-        (models.iter().any(|m| !m.mesh.texcoords.is_empty()), models.iter().any(|m| !m.mesh.normals.is_empty()));
-    let mut mesh = Mesh::default();
-    for tobj::Model { mesh: part, .. } in models {
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend(part.positions.chunks_exact(3).map(Vec3::from_slice));
-        mesh.uvs.extend(part.texcoords.chunks_exact(2).map(|t| Vec2::new(t[0], 1.0 - t[1])));
-        mesh.normals.extend(part.normals.chunks_exact(3).map(Vec3::from_slice));
-        if any_uv {
-            mesh.uvs.resize(mesh.positions.len(), Vec2::ZERO);
-        }
-        if any_normal {
-            mesh.normals.resize(mesh.positions.len(), Vec3::ZERO);
-        }
-        mesh.triangles.extend(part.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]));
+pub fn parse(text: &[u8], path: &Path) -> Result<MeshFile> {
+    let mut lines = Lines::default();
+    for (number, line) in logical_lines(text) {
+        lines.add(&line, number).map_err(|e| Error::at_line(path, number, e))?;
     }
-    if mesh.triangles.is_empty() {
+    for ((name, count), (index, line)) in NAMES.iter().zip(lines.counts()).zip(lines.highest) {
+        if index > count as i64 {
+            let message = format!("index {index}, but the file has only {count} {name} lines");
+            return Err(Error::at_line(path, line, message));
+        }
+    }
+    if lines.sizes.is_empty() {
         return Err(Error::input(path, "no faces found, expected at least one \"f\" line"));
     }
-    crate::scene::mesh::check(&mesh).map_err(|e| first_bad_number(text, path).unwrap_or_else(|| Error::input(path, e)))?;
-    Ok(mesh)
+    let file = lines.into_file();
+    check(&file.mesh).map_err(|e| Error::input(path, e))?;
+    Ok(file)
+}
+
+const NAMES: [&str; 3] = ["v", "vt", "vn"];
+
+/// Lines without comments and the white space around them, each with the number of its first line; one that ends in a backslash is joined
+/// with the next.
+fn logical_lines(text: &[u8]) -> impl Iterator<Item = (u32, Cow<'_, [u8]>)> {
+    let mut physical = text.split(|&b| b == b'\n').zip(1..).map(|(line, number)| {
+        let line = line.split(|&b| b == b'#').next().unwrap_or_default();
+        (number, line.trim_ascii())
+    });
+    std::iter::from_fn(move || {
+        let (number, line) = physical.next()?;
+        let Some(mut begun) = line.strip_suffix(b"\\") else { return Some((number, Cow::Borrowed(line))) };
+        let mut whole = Vec::new();
+        loop {
+            whole.extend_from_slice(begun);
+            whole.push(b' ');
+            let Some((_, next)) = physical.next() else { break };
+            match next.strip_suffix(b"\\") {
+                Some(next) => begun = next,
+                None => {
+                    whole.extend_from_slice(next);
+                    break;
+                }
+            }
+        }
+        Some((number, Cow::Owned(whole)))
+    })
+}
+
+/// What the lines of a file hold.
+#[derive(Default)]
+struct Lines {
+    positions: Vec<Vec3>,
+    /// One a position, as soon as one has a colour.
+    colors: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    /// Indices from 0 of position, uv and normal of all faces' corners.
+    corners: Vec<[u32; 3]>,
+    /// Corners of each face.
+    sizes: Vec<usize>,
+    /// Highest index and its line, of v, vt, vn: they may come before the lines that they mean.
+    highest: [(i64, u32); 3],
+}
+
+impl Lines {
+    fn counts(&self) -> [usize; 3] {
+        [self.positions.len(), self.uvs.len(), self.normals.len()]
+    }
+
+    fn add(&mut self, line: &[u8], number: u32) -> std::result::Result<(), String> {
+        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        let rest = &line[word.len()..];
+        match word {
+            b"v" => {
+                let mut numbers = [1.0; 6];
+                let found = self::numbers(line, rest, 3, &mut numbers)?;
+                self.positions.push(Vec3::from_slice(&numbers));
+                if found == 6 && self.colors.is_empty() {
+                    self.colors.resize(self.positions.len() - 1, Vec3::ONE);
+                }
+                if found == 6 || !self.colors.is_empty() {
+                    self.colors.push(if found == 6 { Vec3::from_slice(&numbers[3..]) } else { Vec3::ONE });
+                }
+            }
+            b"vt" => {
+                let mut numbers = [0.0; 2];
+                self::numbers(line, rest, 1, &mut numbers)?;
+                self.uvs.push(Vec2::new(numbers[0], 1.0 - numbers[1]));
+            }
+            b"vn" => {
+                let mut numbers = [0.0; 3];
+                self::numbers(line, rest, 3, &mut numbers)?;
+                self.normals.push(Vec3::from(numbers));
+            }
+            b"f" | b"fo" => {
+                let before = self.corners.len();
+                let counts = self.counts().map(|n| n as u64);
+                face(rest, counts, number, &mut self.highest, &mut self.corners)?;
+                self.sizes.push(self.corners.len() - before);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn into_file(self) -> MeshFile {
+        let (any_uv, any_normal) = (self.corners.iter().any(|c| c[1] != NONE), self.corners.iter().any(|c| c[2] != NONE));
+        let mut mesh = Mesh::default();
+        let mut colors = Vec::new();
+        let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());
+        let mut first = 0;
+        for size in self.sizes {
+            let mut vertex = |c: usize| {
+                let corner = self.corners[first + c];
+                *known.entry(corner).or_insert_with(|| {
+                    let [p, uv, n] = corner.map(|i| i as usize);
+                    mesh.positions.push(self.positions[p]);
+                    colors.extend(self.colors.get(p));
+                    if any_uv {
+                        mesh.uvs.push(self.uvs.get(uv).copied().unwrap_or(Vec2::ZERO));
+                    }
+                    if any_normal {
+                        mesh.normals.push(self.normals.get(n).copied().unwrap_or(Vec3::ZERO));
+                    }
+                    mesh.positions.len() as u32 - 1
+                })
+            };
+            let a = vertex(0);
+            let mut b = vertex(1);
+            let mut fan = Vec::with_capacity(size - 2);
+            for c in 2..size {
+                let last = vertex(c);
+                fan.push([a, b, last]);
+                b = last;
+            }
+            mesh.triangles.extend(fan);
+            first += size;
+        }
+        let color = MeshAttribute { name: "vertex_color".into(), values: colors };
+        MeshFile { mesh, attributes: if color.values.is_empty() { Vec::new() } else { vec![color] } }
+    }
+}
+
+/// The numbers after a line's first word, at least `least`; how many of `out` there are.
+fn numbers(line: &[u8], rest: &[u8], least: usize, out: &mut [f32]) -> std::result::Result<usize, String> {
+    let mut found = 0;
+    let words = rest.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+    for (place, word) in out.iter_mut().zip(words) {
+        match std::str::from_utf8(word).ok().and_then(|w| w.parse::<f32>().ok()).filter(|x| x.is_finite()) {
+            Some(x) => *place = x,
+            None if found >= least => break,
+            None => return Err(format!("found \"{}\", expected {least} finite numbers", String::from_utf8_lossy(line))),
+        }
+        found += 1;
+    }
+    match found {
+        n if n < least => Err(format!("found \"{}\", expected {least} finite numbers", String::from_utf8_lossy(line))),
+        n => Ok(n),
+    }
 }
 
 /// Which indices the corners of a face have.
@@ -54,51 +190,20 @@ struct Kind {
     normal: bool,
 }
 
-/// The `v`, `vt`, `vn` and `f` lines of a file, faces checked. Where faces change between having and lacking uvs or normals,
-/// an `o` line makes `tobj` begin a new part, since within a part it wants them all alike.
-fn geometry_lines(text: &[u8], path: &Path) -> Result<Vec<u8>> {
-    let mut out = Vec::with_capacity(text.len());
-    let mut counts = [0u64; 3];
-    let mut highest = [(0i64, 0u32); 3]; // index and line, of v, vt, vn
-    let mut last_kind = None;
-    for (number, line) in text.split(|&b| b == b'\n').enumerate() {
-        let line = if line.contains(&b'#') { line.split(|&b| b == b'#').next().unwrap_or_default() } else { line };
-        let line = line.trim_ascii();
-        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-        let number = number as u32 + 1;
-        match word {
-            b"v" => counts[0] += 1,
-            b"vt" => counts[1] += 1,
-            b"vn" => counts[2] += 1,
-            b"f" => {
-                let kind = face(&line[1..], counts, number, &mut highest).map_err(|e| Error::at_line(path, number, e))?;
-                if last_kind.is_some_and(|k| k != kind) {
-                    out.extend_from_slice(b"o part\n");
-                }
-                last_kind = Some(kind);
-            }
-            _ => continue,
-        }
-        out.extend_from_slice(line);
-        out.push(b'\n');
-    }
-    for k in 0..3 {
-        let (index, line) = highest[k];
-        if index > counts[k] as i64 {
-            let message = format!("index {index}, but the file has only {} {} lines", counts[k], ["v", "vt", "vn"][k]);
-            return Err(Error::at_line(path, line, message));
-        }
-    }
-    Ok(out)
-}
-
-/// Checks one face's corners. Absolute indices are compared later, when all lines are counted.
-fn face(corners: &[u8], counts: [u64; 3], line: u32, highest: &mut [(i64, u32); 3]) -> std::result::Result<Kind, String> {
+/// Reads one face's corners into `out`. Absolute indices are compared later, when all lines are counted.
+fn face(
+    corners: &[u8],
+    counts: [u64; 3],
+    line: u32,
+    highest: &mut [(i64, u32); 3],
+    out: &mut Vec<[u32; 3]>,
+) -> std::result::Result<(), String> {
     let mut kind = None;
     let mut n = 0;
     for corner in corners.split(u8::is_ascii_whitespace).filter(|c| !c.is_empty()) {
         let shown = || String::from_utf8_lossy(corner).into_owned();
         let mut seen = [false; 3];
+        let mut indices = [NONE; 3];
         for (k, index) in corner.split(|&b| b == b'/').enumerate() {
             if k > 2 {
                 return Err(format!("face corner \"{}\" has more than three indices", shown()));
@@ -112,16 +217,13 @@ fn face(corners: &[u8], counts: [u64; 3], line: u32, highest: &mut [(i64, u32); 
                 .ok_or_else(|| format!("face corner \"{}\" is not made of whole numbers", shown()))?;
             let value = i64::from(value);
             if value == 0 || value < -(counts[k] as i64) {
-                return Err(format!(
-                    "index {value} in \"{}\", but {} {} lines precede it",
-                    shown(),
-                    counts[k],
-                    ["v", "vt", "vn"][k]
-                ));
+                return Err(format!("index {value} in \"{}\", but {} {} lines precede it", shown(), counts[k], NAMES[k]));
             }
             if value > highest[k].0 {
                 highest[k] = (value, line);
             }
+            // Negative ones count back from the last line so far.
+            indices[k] = if value > 0 { value - 1 } else { counts[k] as i64 + value } as u32;
             seen[k] = true;
         }
         let this = Kind { uv: seen[1], normal: seen[2] };
@@ -129,31 +231,13 @@ fn face(corners: &[u8], counts: [u64; 3], line: u32, highest: &mut [(i64, u32); 
             return Err(format!("face corner \"{}\" does not match the face's other corners", shown()));
         }
         kind = Some(this);
+        out.push(indices);
         n += 1;
     }
     match kind {
-        Some(kind) if n >= 3 => Ok(kind),
+        Some(_) if n >= 3 => Ok(()),
         _ => Err(format!("face of {n} corners, expected at least 3")),
     }
-}
-
-/// The first `v`, `vt` or `vn` line that lacks a finite number, as an error.
-fn first_bad_number(text: &[u8], path: &Path) -> Option<Error> {
-    for (number, line) in text.split(|&b| b == b'\n').enumerate() {
-        let line = String::from_utf8_lossy(line);
-        let mut words = line.split_whitespace();
-        let wanted = match words.next() {
-            Some("v" | "vn") => 3,
-            Some("vt") => 2,
-            _ => continue,
-        };
-        let found = words.take(wanted).filter_map(|w| w.parse::<f32>().ok()).filter(|x| x.is_finite()).count();
-        if found < wanted {
-            let message = format!("found \"{}\", expected {wanted} finite numbers", line.trim());
-            return Some(Error::at_line(path, number as u32 + 1, message));
-        }
-    }
-    None
 }
 
 #[cfg(test)]
@@ -161,7 +245,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Mesh> {
-        parse(text.as_bytes(), Path::new("mesh.obj"))
+        parse(text.as_bytes(), Path::new("mesh.obj")).map(|file| file.mesh)
     }
 
     const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0.1 0.2\nvt .9 .3\nvt .8 .7\nvt .1 .95\n";
@@ -179,7 +263,7 @@ mod tests {
         let mut text = b"mtllib none.mtl\ng caf\xe9\n".to_vec();
         text.extend_from_slice(QUAD.as_bytes());
         text.extend_from_slice(b"o a\nusemtl x\nf 1 2 3 # first\ng b\nusemtl y\r\ns 1\nf -4 -2 -1\r\n");
-        let mesh = parse(&text, Path::new("mesh.obj")).unwrap();
+        let mesh = parse(&text, Path::new("mesh.obj")).unwrap().mesh;
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (4, 2));
     }
 

@@ -4,6 +4,7 @@
 //! number. The stream holds flags, (version 4) a name, the two counts, then positions, normals, texture coordinates,
 //! colours and indices, all little-endian.
 
+use super::{MeshAttribute, MeshFile};
 use crate::scene::mesh::Mesh;
 use crate::{Error, Result};
 use flate2::bufread::ZlibDecoder;
@@ -18,18 +19,18 @@ const HAS_COLORS: u32 = 0x0008;
 const DOUBLE: u32 = 0x2000;
 
 /// Reads mesh `shape_index` of a serialized file.
-pub fn load(path: &Path, shape_index: usize) -> Result<Mesh> {
+pub fn load(path: &Path, shape_index: usize) -> Result<MeshFile> {
     parse(&std::fs::read(path).map_err(|e| Error::io(path, e))?, shape_index, path)
 }
 
 /// Reads mesh `shape_index` from the bytes of a serialized file; `path` is for messages.
-pub fn parse(bytes: &[u8], shape_index: usize, path: &Path) -> Result<Mesh> {
-    let mesh = decode(bytes, shape_index).map_err(|e| Error::input(path, e))?;
-    crate::scene::mesh::check(&mesh).map_err(|e| Error::input(path, format!("mesh {shape_index}: {e}")))?;
-    Ok(mesh)
+pub fn parse(bytes: &[u8], shape_index: usize, path: &Path) -> Result<MeshFile> {
+    let file = decode(bytes, shape_index).map_err(|e| Error::input(path, e))?;
+    crate::scene::mesh::check(&file.mesh).map_err(|e| Error::input(path, format!("mesh {shape_index}: {e}")))?;
+    Ok(file)
 }
 
-fn decode(bytes: &[u8], shape_index: usize) -> std::result::Result<Mesh, String> {
+fn decode(bytes: &[u8], shape_index: usize) -> std::result::Result<MeshFile, String> {
     let version = header(bytes)?;
     let offset = offset(bytes, version, shape_index)?;
     let body = usize::try_from(offset).ok().and_then(|o| bytes.get(o..)).unwrap_or_default();
@@ -42,7 +43,7 @@ fn decode(bytes: &[u8], shape_index: usize) -> std::result::Result<Mesh, String>
     }
     let vertices = stream.count("vertex count")?;
     let triangles = stream.count("triangle count")?;
-    let mut mesh = Mesh::default();
+    let (mut mesh, mut attributes) = (Mesh::default(), Vec::new());
     let wide = flags & DOUBLE != 0;
     mesh.positions = stream.floats(vertices, 3, wide, "positions")?.chunks_exact(3).map(Vec3::from_slice).collect();
     if flags & HAS_NORMALS != 0 {
@@ -52,12 +53,13 @@ fn decode(bytes: &[u8], shape_index: usize) -> std::result::Result<Mesh, String>
         mesh.uvs = stream.floats(vertices, 2, wide, "texture coordinates")?.chunks_exact(2).map(Vec2::from_slice).collect();
     }
     if flags & HAS_COLORS != 0 {
-        stream.floats(vertices, 3, wide, "colours")?;
+        let values = stream.floats(vertices, 3, wide, "colours")?.chunks_exact(3).map(Vec3::from_slice).collect();
+        attributes.push(MeshAttribute { name: "vertex_color".into(), values });
     }
     let indices = stream.bytes(triangles * 12, "triangles")?;
     let index = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
     mesh.triangles = indices.chunks_exact(12).map(|t| [index(t), index(&t[4..]), index(&t[8..])]).collect();
-    Ok(mesh)
+    Ok(MeshFile { mesh, attributes })
 }
 
 /// Version of the file or mesh that begins with `bytes`.
@@ -183,7 +185,7 @@ mod tests {
     }
 
     fn read(bytes: &[u8], index: usize) -> Result<Mesh> {
-        parse(bytes, index, Path::new("a.serialized"))
+        parse(bytes, index, Path::new("a.serialized")).map(|file| file.mesh)
     }
 
     #[test]

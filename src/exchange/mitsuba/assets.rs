@@ -2,7 +2,7 @@
 
 use super::params::Ids;
 use super::tree::{Kind, Node, Param, Value};
-use crate::exchange::mesh::{obj, ply, serialized};
+use crate::exchange::mesh::{MeshAttribute, MeshFile, obj, ply, serialized};
 use crate::material::image;
 use crate::material::image::Image;
 use crate::scene::mesh::Mesh;
@@ -22,7 +22,7 @@ enum Use {
 }
 
 enum Content {
-    Mesh(Arc<Mesh>),
+    Mesh(Arc<Mesh>, Vec<MeshAttribute>),
     Image(Arc<Image>),
 }
 
@@ -30,11 +30,12 @@ enum Content {
 pub struct Assets {
     contents: BTreeMap<(PathBuf, Use), Content>,
     hashes: BTreeMap<PathBuf, blake3::Hash>,
+    warnings: Vec<String>,
 }
 
 impl Assets {
-    /// Reads every file under `children`. The error, if any, is that of the first bad file in scene order.
-    pub fn load(children: &[Param]) -> Result<Self> {
+    /// Reads every file under `children`. The error, if any, tells of all bad files in scene order.
+    pub fn load(children: &[Param], allow_truncated: bool) -> Result<Self> {
         let mut uses = Vec::new();
         walk(children, &mut |node| {
             if let Some(file) = file_of(node) {
@@ -44,18 +45,32 @@ impl Assets {
         let mut files: Vec<PathBuf> = uses.iter().map(|(f, _)| f.clone()).collect();
         first_of_each(&mut uses);
         first_of_each(&mut files);
-        let contents: Vec<Result<Content>> = uses.par_iter().map(|(file, u)| read(file, *u)).collect();
-        let contents = contents.into_iter().collect::<Result<Vec<_>>>()?;
+        let read_all: Vec<_> = uses.par_iter().map(|(file, u)| read(file, *u, allow_truncated)).collect();
+        let (contents, odd): (Vec<_>, Vec<_>) = Error::gather(read_all)?.into_iter().unzip();
+        let warnings = odd.into_iter().flatten().collect();
         let hashes: Vec<Result<blake3::Hash>> = files.par_iter().map(|f| hash(f)).collect();
         let hashes = hashes.into_iter().collect::<Result<Vec<_>>>()?;
-        Ok(Self { contents: uses.into_iter().zip(contents).collect(), hashes: files.into_iter().zip(hashes).collect() })
+        Ok(Self { contents: uses.into_iter().zip(contents).collect(), hashes: files.into_iter().zip(hashes).collect(), warnings })
+    }
+
+    /// What was odd about the files, but no error.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The mesh of a shape plugin that names a file.
     pub fn mesh(&self, node: &Node) -> Result<Arc<Mesh>> {
         match self.content(node)? {
-            Content::Mesh(mesh) => Ok(mesh.clone()),
+            Content::Mesh(mesh, _) => Ok(mesh.clone()),
             Content::Image(_) => Err(node.at.error("found an image, expected a mesh")),
+        }
+    }
+
+    /// What the mesh of a shape plugin that names a file says of its vertices and faces.
+    pub fn attributes(&self, node: &Node) -> &[MeshAttribute] {
+        match self.content(node) {
+            Ok(Content::Mesh(_, attributes)) => attributes,
+            _ => &[],
         }
     }
 
@@ -63,7 +78,7 @@ impl Assets {
     pub fn image(&self, node: &Node) -> Result<Arc<Image>> {
         match self.content(node)? {
             Content::Image(image) => Ok(image.clone()),
-            Content::Mesh(_) => Err(node.at.error("found a mesh, expected an image")),
+            Content::Mesh(..) => Err(node.at.error("found a mesh, expected an image")),
         }
     }
 
@@ -139,12 +154,17 @@ fn is_raw(node: &Node) -> bool {
     })
 }
 
-fn read(file: &Path, what: Use) -> Result<Content> {
+/// What a file holds, and what is odd about it.
+fn read(file: &Path, what: Use, allow_truncated: bool) -> Result<(Content, Vec<String>)> {
+    let mesh = |file: MeshFile| (Content::Mesh(Arc::new(file.mesh), file.attributes), Vec::new());
     Ok(match what {
-        Use::Obj => Content::Mesh(Arc::new(obj::load(file)?)),
-        Use::Ply => Content::Mesh(Arc::new(ply::load(file)?)),
-        Use::Serialized(index) => Content::Mesh(Arc::new(serialized::load(file, index as usize)?)),
-        Use::Image { raw } => Content::Image(Arc::new(image::read(file, raw)?)),
+        Use::Obj => mesh(obj::load(file)?),
+        Use::Ply => mesh(ply::load(file)?),
+        Use::Serialized(index) => mesh(serialized::load(file, index as usize)?),
+        Use::Image { raw } => {
+            let (image, odd) = image::read(file, image::ReadOptions { raw, allow_truncated })?;
+            (Content::Image(Arc::new(image)), odd)
+        }
     })
 }
 

@@ -8,7 +8,7 @@
 
 use super::spectrum;
 use super::transform::Steps;
-use super::tree::{Folders, Kind, Lines, Location, MAX_DEPTH, Node, Param, Value, snake_case};
+use super::tree::{Folders, Kind, Lines, Location, MAX_DEPTH, Node, Param, Parsed, Value, snake_case};
 use crate::io::read_text;
 use crate::{Error, Result};
 use glam::{DMat4, DVec3};
@@ -17,15 +17,22 @@ use serde_json::value::RawValue;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Parses a file; the result is the scene's children in order.
-pub fn parse(path: &Path) -> Result<Vec<Param>> {
+/// Parses a file.
+pub fn parse(path: &Path, defines: &[(String, String)]) -> Result<Parsed> {
     let text = read_text(path)?;
+    // Some editors begin a file with a byte order mark.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let root: &RawValue =
-        serde_json::from_str(&text).map_err(|e| Error::at_line(path, e.line() as u32, format!("not well-formed JSON: {e}")))?;
-    let reader = Reader { text: &text, lines: Lines::new(&text), file: path.into(), folders: Folders::of(path) };
+        serde_json::from_str(text).map_err(|e| Error::at_line(path, e.line() as u32, format!("not well-formed JSON: {e}")))?;
+    let reader = Reader { text, lines: Lines::new(text), file: path.into(), folders: Folders::of(path) };
     let at = reader.at(root);
     match reader.value("", root, None, 0)? {
-        Value::Plugin(node) if node.plugin == "scene" => Ok(node.params),
+        Value::Plugin(node) if node.plugin == "scene" => {
+            let ignored = |(name, value): &(String, String)| {
+                format!("{}: --define {name}={value} is ignored: JSON scenes have no parameters", path.display())
+            };
+            Ok(Parsed { children: node.params, warnings: defines.iter().map(ignored).collect() })
+        }
         other => Err(at.error(format!("found {}, expected {{\"type\": \"scene\", ...}}", other.describe()))),
     }
 }
@@ -101,8 +108,9 @@ impl<'a> Reader<'a> {
     fn dictionary(&self, key: &str, raw: &'a RawValue, depth: usize) -> Result<Value> {
         let at = self.at(raw);
         let Dictionary(entries) = self.read(raw, "a dictionary")?;
-        for (i, (name, value)) in entries.iter().enumerate() {
-            if entries[..i].iter().any(|(n, _)| n == name) {
+        let mut seen = std::collections::BTreeSet::new();
+        for (name, value) in &entries {
+            if !seen.insert(name.as_str()) {
                 return Err(self.at(value).error(format!("the key \"{name}\" is here twice")));
             }
         }
@@ -124,7 +132,7 @@ impl<'a> Reader<'a> {
         let is_scene = plugin == "scene" && depth == 0;
         let kind = match is_scene {
             true => Kind::Other,
-            false => Kind::from_plugin(&plugin, key).ok_or_else(|| at.error(format!("unknown plugin \"{plugin}\"")))?,
+            false => Kind::from_plugin(&plugin, key).unwrap_or(Kind::Unsupported),
         };
         let mut id = get("id").map(|v| self.read(v, "a string, an id")).transpose()?;
         if depth == 1 && id.is_none() {
@@ -177,6 +185,10 @@ impl<'a> Reader<'a> {
             let is_steps = items.is_empty() || items[0].get().starts_with('{');
             let done = if is_steps { self.steps(&items)? } else { self.matrix(raw, &items)? };
             return Ok(Value::Transform(done));
+        }
+        if key == "values" || key == "wavelengths" {
+            let numbers: Vec<String> = items.iter().map(|n| self.number(n).map(|x| x.to_string())).collect::<Result<_>>()?;
+            return Ok(Value::Text(numbers.join(" ")));
         }
         match items.len() {
             3 => Ok(Value::Vector(self.vector(raw)?)),

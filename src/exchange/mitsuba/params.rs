@@ -1,6 +1,7 @@
 //! A plugin's parameters as its loader takes them: typed, with defaults; what nobody takes becomes a warning.
 
 use super::spectrum::{EQUAL_ENERGY_WHITE, reduce};
+use super::spectrum_plugin;
 use super::tree::{Kind, Location, Node, Param, Value};
 use crate::Result;
 use crate::base::math::Rgb;
@@ -17,12 +18,14 @@ pub struct Params<'a> {
     pub node: &'a Node,
     ids: &'a Ids<'a>,
     taken: Vec<bool>,
+    /// What was odd, but is taken.
+    odd: Vec<String>,
 }
 
 impl<'a> Params<'a> {
     /// None taken yet.
     pub fn new(node: &'a Node, ids: &'a Ids<'a>) -> Self {
-        Self { node, ids, taken: vec![false; node.params.len()] }
+        Self { node, ids, taken: vec![false; node.params.len()], odd: Vec::new() }
     }
 
     /// The parameter of that name. Where a file gives it twice, the last counts.
@@ -47,6 +50,11 @@ impl<'a> Params<'a> {
         for name in names {
             self.get(name);
         }
+    }
+
+    /// Takes all that is left.
+    pub fn accept_all(&mut self) {
+        self.taken.fill(true);
     }
 
     /// A number.
@@ -131,8 +139,54 @@ impl<'a> Params<'a> {
     pub fn color(&mut self, name: &str, default: Rgb) -> Result<Rgb> {
         match self.get(name) {
             None => Ok(default),
-            Some(p) => color_of(p, self.node)?.ok_or_else(|| wrong(p, self.node, "a colour")),
+            Some(p) => self.color_of(p)?.ok_or_else(|| wrong(p, self.node, "a colour")),
         }
+    }
+
+    /// A parameter as a colour, where it is one. An emitter's spectra keep their white, a surface's are seen under D65.
+    ///
+    /// Numbers below 0 are Mitsuba's choice: a reflectance given as RGB may not be; a metal's eta and k may, and count by their size;
+    /// anything else is taken for 0 (ours: Mitsuba goes on with it).
+    pub fn color_of(&mut self, p: &'a Param) -> Result<Option<Rgb>> {
+        let emitter = self.node.kind == Kind::Emitter;
+        let color = match &p.value {
+            Value::Integer(_) | Value::Float(_) => number_of(p, self.node)?.map(Rgb::splat),
+            Value::Uniform(x) => Some(if emitter { EQUAL_ENERGY_WHITE } else { Rgb::ONE } * *x as f32),
+            Value::Color(c) => Some(*c),
+            Value::Vector(v) => Some(v.as_vec3()),
+            Value::Spectrum(pairs) => Some(reduce(pairs, emitter)),
+            _ => match self.plugin_of(p)? {
+                Some(plugin) if plugin.kind == Kind::Texture => spectrum_plugin::color(plugin, self, emitter)?,
+                _ => None,
+            },
+        };
+        let Some(c) = color else { return Ok(None) };
+        let (plugin, name) = (&self.node.plugin, &p.name);
+        if !c.is_finite() {
+            return Err(p.at.error(format!("{plugin}: {name} = {c}: expected finite numbers")));
+        }
+        if c.min_element() >= 0.0 {
+            return Ok(color);
+        }
+        let (taken, why) = match (self.node.kind, &p.value) {
+            (Kind::Bsdf, _) if matches!(name.as_str(), "eta" | "k") => (c.abs(), "its size is taken, as only squares count"),
+            (Kind::Bsdf | Kind::Texture, Value::Color(_) | Value::Vector(_)) => {
+                return Err(p.at.error(format!("{plugin}: {name} = {c}: expected finite numbers of at least 0")));
+            }
+            _ => (c.max(Rgb::ZERO), "0 is taken for what is below"),
+        };
+        self.odd.push(p.at.warning(format!("{plugin}: {name} = {c}: {why}")));
+        Ok(Some(taken))
+    }
+
+    /// Keeps a warning for [`Params::finish`].
+    pub fn warn(&mut self, warning: String) {
+        self.odd.push(warning);
+    }
+
+    /// The parameters of another plugin of the same scene.
+    pub fn of(&self, node: &'a Node) -> Self {
+        Self::new(node, self.ids)
     }
 
     /// Children of a kind, references followed, in file order.
@@ -168,7 +222,12 @@ impl<'a> Params<'a> {
 
     /// Warns of what was not taken.
     pub fn finish(self, warnings: &mut Vec<String>) {
+        warnings.extend(self.odd);
         for (p, _) in self.node.params.iter().zip(&self.taken).filter(|(_, taken)| !**taken) {
+            // What is not supported at all is told elsewhere.
+            if matches!(&p.value, Value::Plugin(n) if n.kind == Kind::Unsupported) {
+                continue;
+            }
             let what = match &p.value {
                 Value::Plugin(n) if p.name.is_empty() => format!("child \"{}\"", n.plugin),
                 Value::Reference(id) if p.name.is_empty() => format!("reference to \"{id}\""),
@@ -181,7 +240,11 @@ impl<'a> Params<'a> {
 
 /// "roughplastic: alpha is a string, expected a number".
 pub fn wrong(p: &Param, node: &Node, expected: &str) -> crate::Error {
-    p.at.error(format!("{}: {} is {}, expected {expected}", node.plugin, p.name, p.value.describe()))
+    let found = match &p.value {
+        Value::Plugin(child) => format!("the plugin \"{}\"", child.plugin),
+        value => value.describe().to_owned(),
+    };
+    p.at.error(format!("{}: {} is {found}, expected {expected}", node.plugin, p.name))
 }
 
 /// A parameter as a number, where it is one.
@@ -192,23 +255,4 @@ pub fn number_of(p: &Param, node: &Node) -> Result<Option<f32>> {
         _ => return Ok(None),
     };
     if x.is_finite() { Ok(Some(x)) } else { Err(p.at.error(format!("{}: {} = {x}", node.plugin, p.name))) }
-}
-
-/// A parameter as a colour, where it is one. An emitter's spectra keep their white, a surface's are seen under D65.
-pub fn color_of(p: &Param, node: &Node) -> Result<Option<Rgb>> {
-    let emitter = node.kind == Kind::Emitter;
-    let color = match &p.value {
-        Value::Integer(_) | Value::Float(_) => number_of(p, node)?.map(Rgb::splat),
-        Value::Uniform(x) => Some(if emitter { EQUAL_ENERGY_WHITE } else { Rgb::ONE } * *x as f32),
-        Value::Color(c) => Some(*c),
-        Value::Vector(v) => Some(v.as_vec3()),
-        Value::Spectrum(pairs) => Some(reduce(pairs, emitter)),
-        _ => None,
-    };
-    match color {
-        Some(c) if !c.is_finite() || c.min_element() < 0.0 => {
-            Err(p.at.error(format!("{}: {} = {c}: expected finite numbers of at least 0", node.plugin, p.name)))
-        }
-        color => Ok(color),
-    }
 }

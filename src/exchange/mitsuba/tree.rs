@@ -24,6 +24,11 @@ impl Location {
         Error::at_line(&self.file, self.line, message)
     }
 
+    /// An error that names this line: what there is not, so that it can be left out.
+    pub fn unsupported(&self, message: impl Into<String>) -> Error {
+        Error::Unsupported { path: self.file.to_path_buf(), line: self.line, message: message.into() }
+    }
+
     /// A warning that names this line.
     pub fn warning(&self, message: impl std::fmt::Display) -> String {
         format!("{}:{}: {message}", self.file.display(), self.line)
@@ -49,6 +54,8 @@ pub enum Kind {
     Film,
     /// Anything that does not change what light does here: samplers, reconstruction filters.
     Other,
+    /// What has no place here: participating media and their parts.
+    Unsupported,
 }
 
 impl Kind {
@@ -63,6 +70,7 @@ impl Kind {
             "integrator" => Self::Integrator,
             "film" => Self::Film,
             "sampler" | "rfilter" => Self::Other,
+            "medium" | "phase" | "volume" | "subsurface" => Self::Unsupported,
             _ => return None,
         })
     }
@@ -80,12 +88,32 @@ impl Kind {
             "path" | "direct" | "volpath" | "volpathmis" | "bdpt" | "aov" | "depth" | "ptracer" | "moment" => Self::Integrator,
             "independent" | "stratified" | "multijitter" | "orthogonal" | "ldsampler" | "sobol" | "halton" | "box" | "tent"
             | "gaussian" | "mitchell" | "catmullrom" | "lanczos" => Self::Other,
+            "merge" | "shapegroup" | "instance" => Self::Shape,
+            "null" => Self::Bsdf,
+            "mesh_attribute" | "d65" | "regular" | "irregular" | "blackbody" | "srgb" | "rawconstant" => Self::Texture,
             _ => match key {
                 "integrator" => Self::Integrator,
                 "film" => Self::Film,
                 "sampler" | "rfilter" => Self::Other,
-                _ => return None,
+                _ => return Self::of_foreign(plugin),
             },
+        })
+    }
+
+    /// What a plugin of Mitsuba's that is not supported would be.
+    fn of_foreign(plugin: &str) -> Option<Self> {
+        Some(match plugin {
+            "bsplinecurve" | "linearcurve" | "sdfgrid" | "ellipsoids" | "ellipsoidsmesh" | "heightfield" => Self::Shape,
+            "hair" | "measured" | "measured_polarized" | "polarizer" | "retarder" | "circular" | "pplastic"
+            | "principledthin" | "difftrans" | "phong" | "ward" | "hk" | "coating" | "roughcoating" | "irawan" => Self::Bsdf,
+            "homogeneous" | "heterogeneous" | "isotropic" | "hg" | "rayleigh" | "sggx" | "tabphase" | "blendphase"
+            | "gridvolume" | "constvolume" => Self::Unsupported,
+            "volume" | "bitmap3d" => Self::Texture,
+            "directionalarea" | "volumelight" | "collimated" | "tangent" => Self::Emitter,
+            "batch" | "distant" | "irradiancemeter" | "radiancemeter" | "fluxmeter" | "mradiancemeter" | "mdistant" => {
+                Self::Sensor
+            }
+            _ => return None,
         })
     }
 }
@@ -103,6 +131,15 @@ pub struct Node {
     pub at: Location,
     /// Its parameters and children in file order.
     pub params: Vec<Param>,
+}
+
+/// A scene file as it was read.
+#[derive(Debug, Default)]
+pub struct Parsed {
+    /// The scene's children in order.
+    pub children: Vec<Param>,
+    /// What was odd about the text but no error, one line each.
+    pub warnings: Vec<String>,
 }
 
 /// A parameter, or a child.
@@ -211,10 +248,14 @@ impl Folders {
         })
     }
 
-    fn candidates<'a>(&'a self, name: &'a str) -> impl Iterator<Item = PathBuf> + 'a {
+    fn candidates(&self, name: &str) -> impl Iterator<Item = PathBuf> {
         // Scenes written on Windows use backslashes.
         let forward = if cfg!(windows) { name.to_owned() } else { name.replace('\\', "/") };
-        self.0.iter().map(move |folder| folder.join(&forward))
+        let beside = self.0.iter().map(|folder| folder.join(&forward)).collect::<Vec<_>>();
+        let here = PathBuf::from(forward);
+        // Last the working folder: programs that write scenes give files as they see them.
+        let anew = (!beside.contains(&here)).then_some(here);
+        beside.into_iter().chain(anew)
     }
 }
 

@@ -2,12 +2,14 @@
 //!
 //! Parameters (`default`, `$name`), `include`, `path` and `alias` are resolved here; references stay for later.
 
+use super::document::{self, Element};
 use super::spectrum;
 use super::transform::Steps;
-use super::tree::{Folders, Kind, Lines, Location, MAX_DEPTH, Node, Param, Value, snake_case};
-use crate::io::read_text;
+use super::tree::{Folders, Kind, Location, MAX_DEPTH, Node, Param, Parsed, Value, snake_case};
 use crate::{Error, Result};
 use glam::DVec3;
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -15,29 +17,35 @@ use std::sync::Arc;
 const MAX_INCLUDES: usize = 16;
 /// Most files of a scene: includes that include twice would multiply without end.
 const MAX_FILES: usize = 1000;
-/// Most elements and attributes in one file.
-const MAX_NODES: u32 = 20_000_000;
 
-/// Parses a file and all that it includes; the result is the scene's children in order.
-pub fn parse(path: &Path, defines: &[(String, String)]) -> Result<Vec<Param>> {
+/// Parses a file and all that it includes.
+pub fn parse(path: &Path, defines: &[(String, String)]) -> Result<Parsed> {
     let mut reader = Reader {
         values: defines.to_vec(),
+        used: RefCell::default(),
         folders: Folders::of(path),
         open: Vec::new(),
         files: 0,
         aliases: Vec::new(),
-        children: Vec::new(),
+        parsed: Parsed::default(),
     };
     reader.file(path)?;
     reader.add_aliases()?;
-    Ok(reader.children)
+    let used = reader.used.into_inner();
+    if let Some((name, value)) = defines.iter().find(|(name, _)| !used.contains(name)) {
+        let known: Vec<&str> = used.iter().map(String::as_str).collect();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        let message = format!("--define {name}={value}: the scene has no parameter \"{name}\", expected one of its own: {known}");
+        return Err(Error::input(path, message));
+    }
+    Ok(reader.parsed)
 }
-
-type Element<'a, 'input> = roxmltree::Node<'a, 'input>;
 
 struct Reader {
     /// `$name` and what it stands for; the first entry of a name counts.
     values: Vec<(String, String)>,
+    /// The names that were asked for, or have a `default`.
+    used: RefCell<BTreeSet<String>>,
     folders: Folders,
     /// Files being read, outermost first: to see an include that goes in circles.
     open: Vec<PathBuf>,
@@ -45,50 +53,45 @@ struct Reader {
     files: usize,
     /// (id, its second name, where).
     aliases: Vec<(String, String, Location)>,
-    children: Vec<Param>,
+    parsed: Parsed,
 }
 
 /// The file that an element stands in.
-struct Source {
-    file: Arc<Path>,
-    lines: Lines,
-}
+struct Source(Arc<Path>);
 
 impl Source {
-    fn at(&self, element: Element) -> Location {
-        Location { file: self.file.clone(), line: self.lines.at(element.range().start) }
+    fn at(&self, element: &Element) -> Location {
+        Location { file: self.0.clone(), line: element.line }
     }
 }
 
 impl Reader {
     fn file(&mut self, path: &Path) -> Result<()> {
-        let text = read_text(path)?;
-        let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
-        let document = roxmltree::Document::parse_with_options(&text, options)
-            .map_err(|e| Error::at_line(path, e.pos().row, format!("not well-formed XML: {e}")))?;
-        let source = Source { file: path.into(), lines: Lines::new(&text) };
+        let (root, odd) = document::parse(path, &std::fs::read(path).map_err(|e| Error::io(path, e))?)?;
+        self.parsed.warnings.extend(odd);
+        let source = Source(path.into());
         self.open.push(path.canonicalize().map_err(|e| Error::io(path, e))?);
         self.folders.add_of(path);
-        let root = document.root_element();
-        match root.tag_name().name() {
+        match root.tag.as_str() {
             "scene" => {
-                for child in root.children().filter(|c| c.is_element()) {
+                for child in &root.children {
                     self.top_level(&source, child)?;
                 }
             }
-            _ if self.open.len() > 1 => self.top_level(&source, root)?,
-            tag => return Err(source.at(root).error(format!("found <{tag}>, expected <scene>"))),
+            _ if self.open.len() > 1 => self.top_level(&source, &root)?,
+            tag => return Err(source.at(&root).error(format!("found <{tag}>, expected <scene>"))),
         }
         self.open.pop();
         Ok(())
     }
 
-    fn top_level(&mut self, source: &Source, element: Element) -> Result<()> {
+    fn top_level(&mut self, source: &Source, element: &Element) -> Result<()> {
         let at = source.at(element);
-        match element.tag_name().name() {
+        match element.tag.as_str() {
             "default" => {
                 let name = self.attribute(&at, element, "name")?;
                 let value = self.attribute(&at, element, "value")?;
+                self.used.borrow_mut().insert(name.clone());
                 if !self.values.iter().any(|(n, _)| *n == name) {
                     self.values.push((name, value));
                 }
@@ -119,7 +122,7 @@ impl Reader {
             }
             _ => {
                 let child = self.param(source, element, None, 0)?;
-                self.children.push(child);
+                self.parsed.children.push(child);
             }
         }
         Ok(())
@@ -128,25 +131,27 @@ impl Reader {
     /// A second name for a plugin is a copy of it under that name.
     fn add_aliases(&mut self) -> Result<()> {
         for (id, second, at) in std::mem::take(&mut self.aliases) {
-            let node = self.children.iter().find_map(|c| match &c.value {
+            let node = self.parsed.children.iter().find_map(|c| match &c.value {
                 Value::Plugin(n) if n.id.as_ref() == Some(&id) => Some(n.clone()),
                 _ => None,
             });
             let mut node = node.ok_or_else(|| at.error(format!("alias: nothing has the id \"{id}\"")))?;
             node.id = Some(second);
-            self.children.push(Param { name: String::new(), at, value: Value::Plugin(node) });
+            self.parsed.children.push(Param { name: String::new(), at, value: Value::Plugin(node) });
         }
         Ok(())
     }
 
-    fn param(&self, source: &Source, element: Element, parent: Option<Kind>, depth: usize) -> Result<Param> {
+    fn param(&self, source: &Source, element: &Element, parent: Option<Kind>, depth: usize) -> Result<Param> {
         let at = source.at(element);
         if depth > MAX_DEPTH {
             return Err(at.error(format!("elements are nested more than {MAX_DEPTH} deep")));
         }
         let name = snake_case(&self.optional(&at, element, "name")?.unwrap_or_default());
-        let tag = element.tag_name().name();
-        if let Some(kind) = Kind::from_tag(tag) {
+        let tag = element.tag.as_str();
+        // A spectrum with a type is a plugin, else a value.
+        let spectrum = (tag == "spectrum" && element.attribute("type").is_some()).then_some(Kind::Texture);
+        if let Some(kind) = Kind::from_tag(tag).or(spectrum) {
             let node = self.plugin(source, element, kind, depth)?;
             return Ok(Param { name, at, value: Value::Plugin(node) });
         }
@@ -154,8 +159,8 @@ impl Reader {
         let value = match tag {
             "ref" => Value::Reference(self.attribute(&at, element, "id")?),
             "boolean" => match text()?.trim() {
-                "true" => Value::Bool(true),
-                "false" => Value::Bool(false),
+                yes if yes.eq_ignore_ascii_case("true") => Value::Bool(true),
+                no if no.eq_ignore_ascii_case("false") => Value::Bool(false),
                 other => return Err(at.error(format!("found \"{other}\", expected true or false"))),
             },
             "integer" => {
@@ -182,26 +187,25 @@ impl Reader {
             }
             _ => return Err(at.error(format!("unknown element <{tag}>"))),
         };
-        if let Some(child) = element.children().find(|c| c.is_element()).filter(|_| tag != "transform") {
-            return Err(source.at(child).error(format!("<{tag}> holds no <{}>", child.tag_name().name())));
+        if let Some(child) = element.children.first().filter(|_| tag != "transform") {
+            return Err(source.at(child).error(format!("<{tag}> holds no <{}>", child.tag)));
         }
         Ok(Param { name, at, value })
     }
 
-    fn plugin(&self, source: &Source, element: Element, kind: Kind, depth: usize) -> Result<Node> {
+    fn plugin(&self, source: &Source, element: &Element, kind: Kind, depth: usize) -> Result<Node> {
         let at = source.at(element);
         let plugin = self.attribute(&at, element, "type")?;
         let id = self.optional(&at, element, "id")?;
-        let children = element.children().filter(|c| c.is_element());
-        let params = children.map(|c| self.param(source, c, Some(kind), depth + 1)).collect::<Result<_>>()?;
+        let params = element.children.iter().map(|c| self.param(source, c, Some(kind), depth + 1)).collect::<Result<_>>()?;
         Ok(Node { kind, plugin, id, at, params })
     }
 
-    fn transform(&self, source: &Source, element: Element) -> Result<glam::DMat4> {
+    fn transform(&self, source: &Source, element: &Element) -> Result<glam::DMat4> {
         let mut steps = Steps::default();
-        for step in element.children().filter(|c| c.is_element()) {
+        for step in &element.children {
             let at = source.at(step);
-            let done = match step.tag_name().name() {
+            let done = match step.tag.as_str() {
                 "translate" => steps.translate(self.vector(&at, step, "value", Some(0.0))?),
                 "scale" => steps.scale(self.vector(&at, step, "value", Some(1.0))?),
                 "rotate" => {
@@ -211,7 +215,7 @@ impl Reader {
                     steps.rotate(axis, number(&at, &self.attribute(&at, step, "angle")?)?)
                 }
                 "lookat" | "lookAt" | "look_at" => {
-                    let up = step.has_attribute("up").then(|| self.vector(&at, step, "up", None)).transpose()?;
+                    let up = step.attribute("up").map(|_| self.vector(&at, step, "up", None)).transpose()?;
                     let (origin, target) = (self.vector(&at, step, "origin", None)?, self.vector(&at, step, "target", None)?);
                     steps.look_at(origin, target, up)
                 }
@@ -225,7 +229,7 @@ impl Reader {
 
     /// Three numbers from one attribute, or from `x`, `y` and `z` where it is missing. With a `default`, a single number
     /// stands for all three, and missing coordinates are allowed.
-    fn vector(&self, at: &Location, element: Element, name: &str, default: Option<f64>) -> Result<DVec3> {
+    fn vector(&self, at: &Location, element: &Element, name: &str, default: Option<f64>) -> Result<DVec3> {
         if let Some(text) = self.optional(at, element, name)? {
             return match (numbers(at, &text)?.as_slice(), default) {
                 (&[x, y, z], _) => Ok(DVec3::new(x, y, z)),
@@ -244,12 +248,12 @@ impl Reader {
         Ok(v)
     }
 
-    fn attribute(&self, at: &Location, element: Element, name: &str) -> Result<String> {
+    fn attribute(&self, at: &Location, element: &Element, name: &str) -> Result<String> {
         self.optional(at, element, name)?
-            .ok_or_else(|| at.error(format!("<{}> has no attribute \"{name}\"", element.tag_name().name())))
+            .ok_or_else(|| at.error(format!("<{}> has no attribute \"{name}\"", element.tag.as_str())))
     }
 
-    fn optional(&self, at: &Location, element: Element, name: &str) -> Result<Option<String>> {
+    fn optional(&self, at: &Location, element: &Element, name: &str) -> Result<Option<String>> {
         element.attribute(name).map(|text| self.substitute(at, text)).transpose()
     }
 
@@ -266,6 +270,7 @@ impl Reader {
                 let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
                 return Err(at.error(format!("the parameter \"${name}\" has no value: no <default>, no --define")));
             };
+            self.used.borrow_mut().insert(name.clone());
             out.push_str(value);
             rest = &rest[name.len()..];
         }

@@ -4,7 +4,7 @@ use super::textures::Textures;
 use super::{NONE, Tables};
 use crate::material::bsdf::roughplastic::COSINES;
 use crate::material::bsdf::{Bsdf, Distribution, Lobes, PlasticParams};
-use crate::material::{Material, Texture};
+use crate::material::{Material, Opacity, Texture};
 use bytemuck::{Pod, Zeroable};
 
 /// `Material` of scene.wgsl.
@@ -75,7 +75,14 @@ impl Models<'_> {
         let flag = |condition: bool, flag: u32| if condition { flag } else { 0 };
         GpuMaterial {
             model,
-            opacity: material.opacity.as_ref().map_or(NONE, |t| self.texture(t)),
+            opacity: match &material.opacity {
+                Some(Opacity::Texture(t)) => self.texture(t),
+                Some(_) => {
+                    self.textures.unknown = Some("textured masks within masks or blends, or on one side");
+                    NONE
+                }
+                None => NONE,
+            },
             lobes: u32::from(bsdf.lobes().bits()),
             flags: flag(bsdf.is_transmissive(), TRANSMISSIVE) | flag(bsdf.is_two_sided(), TWO_SIDED_FLAG),
         }
@@ -171,6 +178,9 @@ impl Models<'_> {
             }
             Bsdf::Blend(m) => {
                 let (first, second) = (self.add(&m.a), self.add(&m.b));
+                if m.coverage.is_some() {
+                    self.textures.unknown = Some("masks within blends");
+                }
                 let has_diffuse = |b: &Bsdf| b.lobes().contains(Lobes::DIFFUSE);
                 GpuModel {
                     first,

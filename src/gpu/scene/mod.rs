@@ -127,6 +127,9 @@ impl GpuScene {
         let models = models.list;
         let emitters = emitters(world, &mut textures, &mut tables);
         let environments = environments(world, &mut textures, &mut tables);
+        if let Some(what) = textures.unknown {
+            return Err(Error::Request(format!("the GPU has no {what}; use --device cpu")));
+        }
         let sun_list = tables.words(world.lights.suns.iter().copied());
         let params = SceneParams {
             environments: environments.len() as u32,

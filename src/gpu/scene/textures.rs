@@ -36,6 +36,8 @@ pub(crate) struct GpuTexture {
 const CONSTANT: u32 = 0;
 const BITMAP: u32 = 1;
 const CHECKERBOARD: u32 = 2;
+/// A checkerboard whose colours are the textures `image.offset` and `image.width`.
+const CHECKERED: u32 = 3;
 
 /// All textures, with each image once.
 #[derive(Default)]
@@ -43,6 +45,8 @@ pub(crate) struct Textures {
     pub list: Vec<GpuTexture>,
     /// Words that the images' offsets count.
     pub pixels: Vec<u32>,
+    /// What of the scene's materials the kernels do not know, if anything.
+    pub unknown: Option<&'static str>,
     images: Vec<(Arc<Image>, GpuImage)>,
     /// Tables of linear values that bytes stand for, and where they lie.
     linear: Vec<(Box<[f32; 256]>, u32)>,
@@ -65,8 +69,18 @@ impl Textures {
                 image: self.image(&bitmap.image, tables),
                 ..placed(&bitmap.to_uv)
             },
-            Texture::Checkerboard { color0, color1, to_uv } => {
-                GpuTexture { kind: CHECKERBOARD, color0: color0.to_array(), color1: color1.to_array(), ..placed(to_uv) }
+            Texture::Checkerboard { colors, to_uv } => match &**colors {
+                [Texture::Constant(color0), Texture::Constant(color1)] => {
+                    GpuTexture { kind: CHECKERBOARD, color0: color0.to_array(), color1: color1.to_array(), ..placed(to_uv) }
+                }
+                [a, b] => {
+                    let (offset, width) = (self.add(a, tables), self.add(b, tables));
+                    GpuTexture { kind: CHECKERED, image: GpuImage { offset, width, ..GpuImage::default() }, ..placed(to_uv) }
+                }
+            },
+            Texture::Attribute(_) => {
+                self.unknown = Some("mesh_attribute textures");
+                GpuTexture::default()
             }
         };
         self.list.push(texture);

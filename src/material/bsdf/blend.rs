@@ -2,7 +2,7 @@
 
 use super::{Bsdf, BsdfSample, Lobes, Query, Scatter, Surface, scalar};
 use crate::base::math::Rgb;
-use crate::material::Texture;
+use crate::material::{Opacity, Texture};
 use glam::{Vec2, Vec3};
 
 /// A linear mix.
@@ -14,11 +14,17 @@ pub struct Blend {
     pub a: Box<Bsdf>,
     /// Where the weight is 1.
     pub b: Box<Bsdf>,
+    /// How much of either is there, where one is masked: the weight is a share of both, masked or not.
+    pub coverage: Option<Box<[Opacity; 2]>>,
 }
 
 impl Blend {
     fn share_of_b(&self, s: &Surface) -> f32 {
-        scalar(&self.weight, s.uv).clamp(0.0, 1.0)
+        let share = scalar(&self.weight, s).clamp(0.0, 1.0);
+        let Some(coverage) = &self.coverage else { return share };
+        let [a, b] = [0, 1].map(|i| coverage[i].eval(s.uv, true).clamp(0.0, 1.0));
+        let all = a * (1.0 - share) + b * share;
+        if all > 0.0 { b * share / all } else { share }
     }
 
     /// Probability of drawing from `b`: its share, where both have a lobe that is asked for.

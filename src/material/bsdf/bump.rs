@@ -59,7 +59,7 @@ impl Tilted for BumpMap {
 
 impl Tilted for NormalMap {
     fn normal(&self, s: &Surface) -> Vec3 {
-        self.texture.eval(s.uv) * 2.0 - Vec3::ONE
+        self.texture.at(s) * 2.0 - Vec3::ONE
     }
 
     fn nested(&self) -> &Bsdf {

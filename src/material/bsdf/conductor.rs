@@ -38,7 +38,7 @@ impl Scatter for Conductor {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        self.specular_reflectance.eval(s.uv) * fresnel::conductor(wi.z, self.eta, self.k)
+        self.specular_reflectance.at(s) * fresnel::conductor(wi.z, self.eta, self.k)
     }
 
     fn alpha(&self, _s: &Surface) -> Option<f32> {
@@ -61,12 +61,12 @@ pub struct RoughConductor {
 
 impl RoughConductor {
     fn facets(&self, s: &Surface, query: Query) -> Microfacets {
-        let alpha = Vec2::new(scalar(&self.alpha_u, s.uv), scalar(&self.alpha_v, s.uv));
+        let alpha = Vec2::new(scalar(&self.alpha_u, s), scalar(&self.alpha_v, s));
         Microfacets::new(self.distribution, alpha * query.roughness_scale)
     }
 
     fn fresnel(&self, s: &Surface, cos: f32) -> Rgb {
-        self.metal.specular_reflectance.eval(s.uv) * fresnel::conductor(cos, self.metal.eta, self.metal.k)
+        self.metal.specular_reflectance.at(s) * fresnel::conductor(cos, self.metal.eta, self.metal.k)
     }
 }
 

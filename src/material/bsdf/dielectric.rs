@@ -22,7 +22,7 @@ pub struct DielectricParams {
 impl DielectricParams {
     /// Reflection and transmission together, for the share `r` that is reflected.
     pub(super) fn albedo(&self, s: &Surface, r: f32) -> Rgb {
-        self.specular_reflectance.eval(s.uv) * r + self.specular_transmittance.eval(s.uv) * (1.0 - r)
+        self.specular_reflectance.at(s) * r + self.specular_transmittance.at(s) * (1.0 - r)
     }
 }
 
@@ -53,10 +53,10 @@ impl Scatter for Dielectric {
         }
         let f = fresnel::dielectric(wi.z, self.eta);
         if u < f.r {
-            return Some(BsdfSample::mirrored(wi, self.params.specular_reflectance.eval(s.uv), f.r));
+            return Some(BsdfSample::mirrored(wi, self.params.specular_reflectance.at(s), f.r));
         }
         // Radiance is compressed by the squared ratio of the indices.
-        let weight = self.params.specular_transmittance.eval(s.uv) * (f.eta_ti * f.eta_ti);
+        let weight = self.params.specular_transmittance.at(s) * (f.eta_ti * f.eta_ti);
         let wo = fresnel::refract(wi, Vec3::Z, &f);
         Some(BsdfSample { wo, weight, pdf: 1.0 - f.r, delta: true, eta: f.eta_it })
     }
@@ -111,9 +111,9 @@ impl Scatter for ThinDielectric {
         }
         let r = self.reflected(wi);
         Some(if u < r {
-            BsdfSample::mirrored(wi, self.params.specular_reflectance.eval(s.uv), r)
+            BsdfSample::mirrored(wi, self.params.specular_reflectance.at(s), r)
         } else {
-            let weight = self.params.specular_transmittance.eval(s.uv);
+            let weight = self.params.specular_transmittance.at(s);
             BsdfSample { wo: -wi, weight, pdf: 1.0 - r, delta: true, eta: 1.0 }
         })
     }

@@ -19,7 +19,7 @@ impl Scatter for Diffuse {
             return (Rgb::ZERO, 0.0);
         }
         let pdf = cosine_hemisphere_pdf(wo);
-        (self.reflectance.eval(s.uv) * pdf, pdf)
+        (self.reflectance.at(s) * pdf, pdf)
     }
 
     fn sample(&self, s: &Surface, wi: Vec3, _u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
@@ -27,7 +27,7 @@ impl Scatter for Diffuse {
             return None;
         }
         let wo = cosine_hemisphere(v);
-        BsdfSample::reflected(wo, self.reflectance.eval(s.uv), cosine_hemisphere_pdf(wo))
+        BsdfSample::reflected(wo, self.reflectance.at(s), cosine_hemisphere_pdf(wo))
     }
 
     fn lobes(&self) -> Lobes {
@@ -35,7 +35,7 @@ impl Scatter for Diffuse {
     }
 
     fn diffuse_out(&self, s: &Surface, wi: Vec3) -> Rgb {
-        if wi.z > 0.0 { self.reflectance.eval(s.uv) } else { Rgb::ZERO }
+        if wi.z > 0.0 { self.reflectance.at(s) } else { Rgb::ZERO }
     }
 
     fn diffuse_in(&self, _s: &Surface, wo: Vec3) -> f32 {

@@ -130,8 +130,8 @@ trait Scatter {
 }
 
 /// A number stored as a texture: its luminance.
-fn scalar(texture: &Texture, uv: Vec2) -> f32 {
-    luminance(texture.eval(uv))
+fn scalar(texture: &Texture, s: &Surface) -> f32 {
+    luminance(texture.at(s))
 }
 
 /// Index of refraction of the inside over that of the outside, both checked.

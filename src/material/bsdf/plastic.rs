@@ -31,7 +31,7 @@ pub(super) struct Colours {
 
 impl PlasticParams {
     pub(super) fn at(&self, s: &Surface) -> Colours {
-        Colours { diffuse: self.diffuse_reflectance.eval(s.uv), specular: self.specular_reflectance.eval(s.uv) }
+        Colours { diffuse: self.diffuse_reflectance.at(s), specular: self.specular_reflectance.at(s) }
     }
 
     /// Radiance of a base of albedo `diffuse`, per irradiance that reaches it through the coating and over the two
@@ -113,7 +113,7 @@ impl Scatter for Plastic {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        let albedo = self.params.diffuse_reflectance.eval(s.uv);
+        let albedo = self.params.diffuse_reflectance.at(s);
         self.params.base(albedo, self.eta, self.internal_reflectance) * (1.0 - self.reflected(wi))
     }
 
@@ -129,7 +129,7 @@ impl Scatter for Plastic {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        self.params.specular_reflectance.eval(s.uv) * self.reflected(wi)
+        self.params.specular_reflectance.at(s) * self.reflected(wi)
     }
 
     fn alpha(&self, _s: &Surface) -> Option<f32> {

@@ -113,13 +113,13 @@ impl Principled {
 
     fn at(&self, s: &Surface, query: Query) -> Point {
         let p = &self.params;
-        let base = p.base_color.eval(s.uv);
-        let (roughness, metallic) = (scalar(&p.roughness, s.uv), scalar(&p.metallic, s.uv));
-        let spec_trans = scalar(&p.spec_trans, s.uv);
-        let aspect = (1.0 - 0.9 * scalar(&p.anisotropic, s.uv)).max(0.0).sqrt();
+        let base = p.base_color.at(s);
+        let (roughness, metallic) = (scalar(&p.roughness, s), scalar(&p.metallic, s));
+        let spec_trans = scalar(&p.spec_trans, s);
+        let aspect = (1.0 - 0.9 * scalar(&p.anisotropic, s)).max(0.0).sqrt();
         let alpha = Vec2::new(roughness * roughness / aspect, roughness * roughness * aspect);
         let alpha = alpha.max(Vec2::splat(SPECULAR_ALPHA_MIN)) * query.roughness_scale;
-        let gloss = scalar(&p.clearcoat_gloss, s.uv);
+        let gloss = scalar(&p.clearcoat_gloss, s);
         let brightness = luminance(base);
         Point {
             base,
@@ -127,8 +127,8 @@ impl Principled {
             metallic,
             opaque: (1.0 - metallic) * (1.0 - spec_trans),
             glass: (1.0 - metallic) * spec_trans,
-            spec_tint: scalar(&p.spec_tint, s.uv),
-            clearcoat: scalar(&p.clearcoat, s.uv),
+            spec_tint: scalar(&p.spec_tint, s),
+            clearcoat: scalar(&p.clearcoat, s),
             coat_alpha: ((0.1 + (0.001 - 0.1) * gloss) * query.roughness_scale).clamp(ALPHA_MIN, 0.99),
             tint: if brightness > 0.0 { base / brightness } else { Rgb::ONE },
             facets: Microfacets::new(Distribution::Ggx, alpha),
@@ -143,16 +143,16 @@ impl Principled {
         let base = (1.0 - 0.5 * f_i) * (1.0 - 0.5 * f_o);
         let retro = retro_90 * (f_o + f_i + f_o * f_i * (retro_90 - 1.0));
         let mut shape = base + retro;
-        let flatness = scalar(&self.params.flatness, s.uv);
+        let flatness = scalar(&self.params.flatness, s);
         if flatness > 0.0 {
             let fade = |f: f32| 1.0 + (0.5 * retro_90 - 1.0) * f;
             let flat = 1.25 * (fade(f_i) * fade(f_o) * (1.0 / (wi.z + wo.z) - 0.5) + 0.5);
             shape += (flat - shape) * flatness;
         }
         let mut value = p.base * (p.opaque * FRAC_1_PI * shape);
-        let sheen = scalar(&self.params.sheen, s.uv) * (1.0 - p.metallic);
+        let sheen = scalar(&self.params.sheen, s) * (1.0 - p.metallic);
         if sheen > 0.0 {
-            let colour = Rgb::ONE.lerp(p.tint, scalar(&self.params.sheen_tint, s.uv));
+            let colour = Rgb::ONE.lerp(p.tint, scalar(&self.params.sheen_tint, s));
             value += colour * (sheen * schlick(cos_d.abs()));
         }
         value * wo.z

@@ -46,7 +46,7 @@ impl RoughDielectric {
     }
 
     fn facets(&self, s: &Surface, query: Query) -> Microfacets {
-        let alpha = Vec2::new(scalar(&self.alpha_u, s.uv), scalar(&self.alpha_v, s.uv));
+        let alpha = Vec2::new(scalar(&self.alpha_u, s), scalar(&self.alpha_v, s));
         Microfacets::new(self.distribution, alpha * query.roughness_scale)
     }
 }
@@ -62,9 +62,9 @@ impl Scatter for RoughDielectric {
         // D G1(wi) (wi·m)/cos wi · dm/dwo: density of the facet; G1(wo) is left for the value.
         let visible = facets.d(m) * facets.g1_over_cos(wi, m) * wi.dot(m).abs() * jacobian;
         let (share, colour) = if wi.z * wo.z > 0.0 {
-            (f.r, self.params.specular_reflectance.eval(s.uv))
+            (f.r, self.params.specular_reflectance.at(s))
         } else {
-            (1.0 - f.r, self.params.specular_transmittance.eval(s.uv) * (f.eta_ti * f.eta_ti))
+            (1.0 - f.r, self.params.specular_transmittance.at(s) * (f.eta_ti * f.eta_ti))
         };
         (colour * (share * visible * facets.g1(wo, m)), share * visible)
     }

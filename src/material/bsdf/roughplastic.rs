@@ -120,7 +120,7 @@ impl Scatter for RoughPlastic {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        let albedo = self.params.diffuse_reflectance.eval(s.uv);
+        let albedo = self.params.diffuse_reflectance.at(s);
         self.params.base(albedo, self.eta, self.internal_reflectance) * self.transmitted(wi)
     }
 
@@ -137,7 +137,7 @@ impl Scatter for RoughPlastic {
             return Rgb::ZERO;
         }
         let (energy, cos) = lobe_albedo(self.distribution, self.alpha * query.roughness_scale, wi.z);
-        self.params.specular_reflectance.eval(s.uv) * (energy * fresnel::dielectric(cos, self.eta).r)
+        self.params.specular_reflectance.at(s) * (energy * fresnel::dielectric(cos, self.eta).r)
     }
 
     fn alpha(&self, _s: &Surface) -> Option<f32> {

@@ -188,6 +188,7 @@ fn own(variant: &Variant, stages: &[&str]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::base::progress::Silent;
+    use crate::exchange::LoadOptions;
     use crate::gpu::Choice;
     use crate::plan::settings::Preset;
     use crate::plan::variant::parse_bake;
@@ -195,7 +196,7 @@ mod tests {
     use std::sync::Arc;
 
     fn context() -> Context {
-        Context::new(3, Choice::Cpu, 1.0, Vec::new(), Arc::new(Silent)).unwrap()
+        Context::new(3, Choice::Cpu, LoadOptions::default(), Arc::new(Silent)).unwrap()
     }
 
     fn evaluate(variants: &[&str], bake: &[&str]) -> Evaluate {

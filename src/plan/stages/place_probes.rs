@@ -113,7 +113,9 @@ impl PlaceProbes {
     /// Where the camera stands: along the path, or the scene's own sensor.
     fn cameras(&self, scene: &Scene, cx: &Context) -> Result<Vec<Vec3>> {
         Ok(match &self.path {
-            Some(path) => camera_path::load(path, scene.sensor.as_ref(), cx.unit_scale)?.iter().map(|c| c.position()).collect(),
+            Some(path) => {
+                camera_path::load(path, scene.sensor.as_ref(), cx.load.unit_scale)?.iter().map(|c| c.position()).collect()
+            }
             None => scene.sensor.iter().map(|c| c.position()).collect(),
         })
     }

@@ -16,7 +16,7 @@ mod triangle;
 mod wide;
 
 use super::facet::uv_at;
-use crate::base::math::{hash_words, luminance, unit};
+use crate::base::math::{hash_words, unit};
 use crate::base::ray::{Hit, Ray};
 use crate::scene::normals::unit_normal;
 use crate::scene::{Geometry, Scene};
@@ -195,7 +195,8 @@ pub(crate) fn passes(scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
     let Some(opacity) = &scene.materials[object.material as usize].opacity else { return false };
     let words = [ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z].map(f32::to_bits);
     let of_ray = hash_words(&words);
+    let from_front = scene.geometry.area_normal(hit.triangle).dot(ray.d) < 0.0;
     // Where a ray's intervals begin is its own.
     let interval = (hit.t / (SHEET * (1.0 + ray.o.abs().max_element())) + unit(of_ray)).floor();
-    unit(hash_words(&[of_ray, object_index, interval.to_bits()])) >= luminance(opacity.eval(uv_at(&scene.geometry, hit)))
+    unit(hash_words(&[of_ray, object_index, interval.to_bits()])) >= opacity.eval(uv_at(&scene.geometry, hit), from_front)
 }

@@ -2,7 +2,7 @@ use super::triangle::Shear;
 use super::*;
 use crate::base::math::{Rgb, direction_from_lat_long};
 use crate::material::bsdf::{Bsdf, Diffuse};
-use crate::material::{Material, Texture};
+use crate::material::{Material, Opacity, Texture};
 use crate::scene::mesh::{Mesh, append};
 use crate::scene::{Geometry, primitives};
 use glam::{Mat4, Vec2, Vec3};
@@ -174,7 +174,7 @@ fn masks_let_through_what_their_opacity_says() {
     let material = |opacity: Option<f32>| Material {
         name: String::new(),
         bsdf: Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::ONE) }),
-        opacity: opacity.map(|o| Texture::Constant(Rgb::splat(o))),
+        opacity: opacity.map(Opacity::constant),
     };
     for opacity in [0.0, 0.3, 1.0] {
         scene.materials = vec![material(Some(opacity)), material(None)];
@@ -212,7 +212,7 @@ fn a_thin_sheet_counts_once_and_two_sheets_twice() {
         scene.materials = vec![Material {
             name: String::new(),
             bsdf: Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::ONE) }),
-            opacity: Some(Texture::Constant(Rgb::splat(opacity))),
+            opacity: Some(Opacity::constant(opacity)),
         }];
         let bvh = Bvh::build(&scene, &|_| true);
         let mut random = Random(4);

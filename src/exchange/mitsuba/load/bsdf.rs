@@ -9,16 +9,16 @@ use crate::material::bsdf::{
     Blend, Bsdf, BumpMap, Conductor, Dielectric, DielectricParams, Diffuse, Distribution, NormalMap, Plastic, PlasticParams,
     Principled, PrincipledParams, RoughConductor, RoughDielectric, RoughPlastic, ThinDielectric, TwoSided,
 };
-use crate::material::{Material, Texture};
+use crate::material::{Material, Opacity, Texture};
 use crate::{Error, Result};
 
 const KNOWN: &str = "diffuse, plastic, roughplastic, conductor, roughconductor, dielectric, thindielectric, roughdielectric, \
-                     twosided, mask, bumpmap, normalmap, blendbsdf, principled";
+                     twosided, mask, null, bumpmap, normalmap, blendbsdf, principled";
 
 const DISTRIBUTIONS: [(&str, Distribution); 2] = [("beckmann", Distribution::Beckmann), ("ggx", Distribution::Ggx)];
 
 /// A scattering model and the coverage that a `mask` in or around it gives.
-type Masked = (Bsdf, Option<Texture>);
+type Masked = (Bsdf, Option<Opacity>);
 
 impl<'a> Builder<'a> {
     /// Index of the material of a scattering model. Where several shapes refer to it, they share it.
@@ -26,6 +26,7 @@ impl<'a> Builder<'a> {
         if let Some(&index) = self.materials.get(&(node as *const Node)) {
             return Ok(index);
         }
+        self.of_one_shape = false;
         let (bsdf, opacity) = self.bsdf(node, 0)?;
         let name = match &node.id {
             Some(id) => id.clone(),
@@ -34,15 +35,16 @@ impl<'a> Builder<'a> {
         };
         let index = self.scene.materials.len() as u32;
         self.scene.materials.push(Material { name, bsdf, opacity });
-        self.materials.insert(node, index);
+        if !self.of_one_shape {
+            self.materials.insert(node, index);
+        }
         Ok(index)
     }
 
     /// What a shape without a scattering model gets: Mitsuba's grey.
     pub(super) fn default_material(&mut self) -> u32 {
         *self.default_material.get_or_insert_with(|| {
-            let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::splat(0.5)) });
-            self.scene.materials.push(Material { name: "default".into(), bsdf, opacity: None });
+            self.scene.materials.push(Material { name: "default".into(), bsdf: grey(0.5), opacity: None });
             self.scene.materials.len() as u32 - 1
         })
     }
@@ -56,12 +58,19 @@ impl<'a> Builder<'a> {
         }
         let mut params = self.params(node);
         let p = &mut params;
-        let masked = match node.plugin.as_str() {
-            "twosided" | "mask" | "bumpmap" | "normalmap" | "blendbsdf" => self.adapter(p, depth)?,
-            _ => (self.model(p)?, None),
+        let built = match node.plugin.as_str() {
+            "twosided" | "mask" | "bumpmap" | "normalmap" | "blendbsdf" => self.adapter(p, depth),
+            // Light goes through as if nothing were there.
+            "null" => Ok((grey(0.0), Some(Opacity::constant(0.0)))),
+            _ => self.model(p).map(|model| (model, None)),
         };
-        params.finish(&mut self.scene.warnings);
-        Ok(masked)
+        match self.or_left_out(built, "a grey diffuse surface stands for it")? {
+            Some(masked) => {
+                params.finish(&mut self.scene.warnings);
+                Ok(masked)
+            }
+            None => Ok((grey(0.5), None)),
+        }
     }
 
     fn model(&mut self, p: &mut Params<'a>) -> Result<Bsdf> {
@@ -114,32 +123,32 @@ impl<'a> Builder<'a> {
             let (found, most) = (nested.len(), allowed.end());
             return Err(node.at.error(format!("{}: found {found} nested bsdfs, expected {most}", node.plugin)));
         }
-        let mut built = nested.iter().map(|n| self.bsdf(n, depth + 1)).collect::<Result<Vec<_>>>()?.into_iter();
+        let mut built = Error::gather(nested.iter().map(|n| self.bsdf(n, depth + 1)).collect::<Vec<_>>())?.into_iter();
         let (first, opacity) = built.next().ok_or_else(|| node.at.error("no nested bsdf"))?;
         let second = built.next();
         let boxed = Box::new(first);
         Ok(match node.plugin.as_str() {
             "twosided" => {
-                if opacity.is_some() || second.as_ref().is_some_and(|(_, o)| o.is_some()) {
-                    // Coverage is the material's, so it is the same from both sides.
-                    if let Some((_, behind)) = &second
-                        && behind.is_some() != opacity.is_some()
-                    {
-                        return Err(node.at.error("a mask on one side of twosided: put it around twosided"));
+                // Coverage is the material's: where the sides differ, each has its own.
+                let opacity = match &second {
+                    Some((_, behind)) if opacity.is_some() || behind.is_some() => {
+                        let [front, back] = [&opacity, behind].map(|o| o.clone().unwrap_or(Opacity::constant(1.0)));
+                        Some(Opacity::Sides(Box::new([front, back])))
                     }
-                }
+                    _ => opacity,
+                };
                 let back = second.map_or_else(|| boxed.clone(), |(b, _)| Box::new(b));
                 (Bsdf::TwoSided(TwoSided { front: boxed, back }), opacity)
             }
             "mask" => {
                 let own = self.textured(p, "opacity", 0.5)?;
-                let both = match (own, opacity) {
-                    (own, None) => own,
-                    (Texture::Constant(a), Some(Texture::Constant(b))) => Texture::Constant(a * b),
-                    (Texture::Constant(c), Some(t)) | (t, Some(Texture::Constant(c))) => {
-                        t.scaled(crate::base::math::luminance(c))
-                    }
-                    _ => return Err(node.at.error("a textured mask within a textured mask is not supported")),
+                if matches!(own, Texture::Attribute(_)) {
+                    p.warn(node.at.warning("mask: of a mesh_attribute the mean is taken"));
+                }
+                let own = Opacity::Texture(own);
+                let both = match opacity {
+                    None => own,
+                    Some(nested) => Opacity::product(own, nested),
                 };
                 (*boxed, Some(both))
             }
@@ -151,11 +160,15 @@ impl<'a> Builder<'a> {
             "normalmap" => (Bsdf::NormalMap(NormalMap { texture: self.only_texture(p)?, nested: boxed }), opacity),
             _ => {
                 let (b, other_opacity) = second.ok_or_else(|| node.at.error("no second nested bsdf"))?;
-                if opacity.is_some() || other_opacity.is_some() {
-                    return Err(node.at.error("a mask within blendbsdf is not supported: put it around blendbsdf"));
-                }
                 let weight = self.textured(p, "weight", 0.5)?;
-                (Bsdf::Blend(Blend { weight, a: boxed, b: Box::new(b) }), None)
+                let mut blend = Blend { weight, a: boxed, b: Box::new(b), coverage: None };
+                if opacity.is_none() && other_opacity.is_none() {
+                    return Ok((Bsdf::Blend(blend), None));
+                }
+                let [a, b] = [opacity, other_opacity].map(|o| o.unwrap_or(Opacity::constant(1.0)));
+                blend.coverage = Some(Box::new([a.clone(), b.clone()]));
+                let opacity = Opacity::blend(blend.weight.clone(), a, b);
+                (Bsdf::Blend(blend), Some(opacity))
             }
         })
     }
@@ -233,6 +246,10 @@ impl<'a> Builder<'a> {
     }
 }
 
+fn grey(reflectance: f32) -> Bsdf {
+    Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::splat(reflectance)) })
+}
+
 fn distribution(p: &mut Params) -> Result<Distribution> {
     p.accept(&["sample_visible"]);
     p.choice("distribution", Distribution::Beckmann, &DISTRIBUTIONS)
@@ -240,7 +257,10 @@ fn distribution(p: &mut Params) -> Result<Distribution> {
 
 fn alpha_number(p: &mut Params) -> Result<f32> {
     let alpha = p.f32("alpha", 0.1)?;
-    if alpha >= 0.0 { Ok(alpha) } else { Err(p.at("alpha").error(format!("alpha = {alpha}: expected at least 0"))) }
+    if alpha < 0.0 {
+        p.warn(p.at("alpha").warning(format!("alpha = {alpha}: 0 is taken for what is below")));
+    }
+    Ok(alpha.max(0.0))
 }
 
 /// A number or a name; `default` is a name.

@@ -1,17 +1,21 @@
 //! From the plugin tree to a [`Scene`].
 
+mod attribute;
 mod bsdf;
 mod emitter;
+mod group;
 mod sensor;
 mod shape;
 mod texture;
 
-use super::assets::{Assets, ids};
+use super::assets::{Assets, ids, walk};
 use super::params::{Ids, Params};
-use super::tree::{Kind, Node, Value};
+use super::tree::{Kind, Node, Param, Parsed, Value};
 use super::{hash, json, xml};
 use crate::scene::Scene;
 use crate::{Error, Result};
+use attribute::Current;
+use glam::DMat4;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -25,42 +29,54 @@ pub struct LoadOptions {
     pub unit_scale: f32,
     /// Values for the scene's `$name` parameters, over its `default`s.
     pub defines: Vec<(String, String)>,
+    /// Leave out, with a warning, what is not supported (`--skip-unsupported`).
+    pub skip_unsupported: bool,
+    /// Take images whose files end early, with a warning (`--allow-truncated`).
+    pub allow_truncated: bool,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { unit_scale: 1.0, defines: Vec::new() }
+        Self { unit_scale: 1.0, defines: Vec::new(), skip_unsupported: false, allow_truncated: false }
     }
 }
 
 /// Loads a Mitsuba XML file, or its JSON form (a file named `.json`).
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let children = if is_json { json::parse(path)? } else { xml::parse(path, &options.defines)? };
+    let Parsed { children, mut warnings } =
+        if is_json { json::parse(path, &options.defines)? } else { xml::parse(path, &options.defines)? };
     let ids = ids(&children)?;
-    let assets = Assets::load(&children)?;
+    let assets = Assets::load(&children, options.allow_truncated)?;
+    warnings.extend_from_slice(assets.warnings());
     let hash = hash::scene(&children, &ids, &assets, options.unit_scale);
     let mut builder = Builder {
         ids: &ids,
         assets: &assets,
         unit_scale: options.unit_scale,
-        scene: Scene { hash, path: path.to_owned(), ..Scene::default() },
+        skip_unsupported: options.skip_unsupported,
+        scene: Scene { hash, path: path.to_owned(), warnings, ..Scene::default() },
         materials: BTreeMap::new(),
         default_material: None,
         built: 0,
         environments: 0,
+        current: None,
+        of_one_shape: false,
+        instance: None,
+        groups: 0,
+        grouped: 0,
     };
-    if is_json && !options.defines.is_empty() {
-        builder.scene.warnings.push(format!("{}: JSON scenes have no parameters: --define is ignored", path.display()));
-    }
+    builder.count_copies(&children)?;
+    let mut results = vec![builder.foreign(&children)];
     for child in &children {
         match &child.value {
-            Value::Plugin(node) => builder.top_level(node)?,
+            Value::Plugin(node) => results.push(builder.top_level_or_nothing(node)),
             other => {
                 builder.scene.warnings.push(child.at.warning(format!("{} directly under the scene is ignored", other.describe())))
             }
         }
     }
+    Error::gather(results).map_err(|e| hint(e, path))?;
     let mut scene = builder.scene;
     if scene.geometry.triangles.is_empty() {
         return Err(Error::input(path, "the scene has no triangles"));
@@ -75,11 +91,27 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Says of several errors which file they are about, and of what is not supported that it can be left out.
+fn hint(e: Error, path: &Path) -> Error {
+    let message = match &e {
+        e if e.is_unsupported() => format!("{e}\n(--skip-unsupported leaves out what is not supported)"),
+        Error::Many(_) => e.to_string(),
+        _ => return e,
+    };
+    match e {
+        Error::Unsupported { path, line, message } => {
+            Error::at_line(path, line, format!("{message} (--skip-unsupported leaves it out)"))
+        }
+        _ => Error::input(path, message),
+    }
+}
+
 /// Builds a scene plugin by plugin.
 struct Builder<'a> {
     ids: &'a Ids<'a>,
     assets: &'a Assets,
     unit_scale: f32,
+    skip_unsupported: bool,
     scene: Scene,
     /// Material of each scattering model that stands by itself, by its place in memory: looked up, never listed.
     materials: BTreeMap<*const Node, u32>,
@@ -88,6 +120,16 @@ struct Builder<'a> {
     built: usize,
     /// Environment emitters so far; Mitsuba allows one.
     environments: usize,
+    /// The shape whose material is being built.
+    current: Option<Current<'a>>,
+    /// Whether what is being built is of one shape alone.
+    of_one_shape: bool,
+    /// `to_world` of the instance that is being added.
+    instance: Option<DMat4>,
+    /// Groups around the shape that is being added.
+    groups: usize,
+    /// Shapes in groups so far.
+    grouped: usize,
 }
 
 impl<'a> Builder<'a> {
@@ -95,10 +137,57 @@ impl<'a> Builder<'a> {
         Params::new(node, self.ids)
     }
 
+    /// Every plugin that has no place here, wherever it stands.
+    fn foreign(&mut self, children: &'a [Param]) -> Result<()> {
+        let mut found = Vec::new();
+        walk(children, &mut |node| found.extend((node.kind == Kind::Unsupported).then_some(node)));
+        let told = found.into_iter().map(|node| {
+            let error = node.at.unsupported(format!(
+                "unknown plugin \"{}\": participating media and their parts are not supported",
+                node.plugin
+            ));
+            self.or_left_out(Err::<(), _>(error), "it is left out").map(|_| ())
+        });
+        Error::gather(told.collect::<Vec<_>>()).map(|_| ())
+    }
+
+    /// What was built, or nothing and a warning where it is not supported and may be left out; `instead` says what becomes of it.
+    fn or_left_out<T>(&mut self, built: Result<T>, instead: &str) -> Result<Option<T>> {
+        match built {
+            Err(Error::Many(several)) if self.skip_unsupported && several.iter().all(Error::is_unsupported) => {
+                self.scene.warnings.extend(several.iter().map(|e| format!("{e}: {instead}")));
+                Ok(None)
+            }
+            Err(e) if self.skip_unsupported && e.is_unsupported() => {
+                self.scene.warnings.push(format!("{e}: {instead}"));
+                Ok(None)
+            }
+            built => built.map(Some),
+        }
+    }
+
+    /// Adds a plugin, unless it may be left out.
+    fn top_level_or_nothing(&mut self, node: &'a Node) -> Result<()> {
+        let emitters = self.scene.emitters.len();
+        let added = self.top_level(node);
+        if self.or_left_out(added, "it is left out")?.is_none() {
+            self.scene.emitters.truncate(emitters);
+        }
+        Ok(())
+    }
+
     fn top_level(&mut self, node: &'a Node) -> Result<()> {
         match node.kind {
-            Kind::Shape => self.shape(node),
-            Kind::Bsdf => self.material(node, "").map(|_| ()),
+            Kind::Shape => self.shapes(node),
+            Kind::Bsdf => {
+                let before = self.scene.materials.len();
+                self.material(node, "")?;
+                // One that is made anew for each shape stands for nothing here.
+                if !self.materials.contains_key(&(node as *const Node)) {
+                    self.scene.materials.truncate(before);
+                }
+                Ok(())
+            }
             Kind::Emitter => self.emitter(node),
             Kind::Sensor if self.scene.sensor.is_none() => self.sensor(node),
             Kind::Sensor => {
@@ -112,7 +201,7 @@ impl<'a> Builder<'a> {
                 self.scene.max_depth = u32::try_from(depth).ok();
                 Ok(())
             }
-            Kind::Film | Kind::Other => Ok(()),
+            Kind::Film | Kind::Other | Kind::Unsupported => Ok(()),
         }
     }
 
@@ -126,6 +215,6 @@ impl<'a> Builder<'a> {
     }
 
     fn unknown(node: &Node, what: &str, known: &str) -> Error {
-        node.at.error(format!("unknown {what} plugin \"{}\": expected one of {known}", node.plugin))
+        node.at.unsupported(format!("unknown {what} plugin \"{}\": expected one of {known}", node.plugin))
     }
 }

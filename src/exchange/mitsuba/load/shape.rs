@@ -1,15 +1,17 @@
 //! Shape plugins.
 
 use super::Builder;
-use crate::Result;
+use super::attribute::Current;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node};
-use crate::scene::mesh::{Mesh, append};
+use crate::material::Texture;
+use crate::scene::mesh::{Mesh, append, swaps_corners};
 use crate::scene::{Emitter, primitives};
+use crate::{Error, Result};
 use glam::{DMat4, DVec3, Vec3};
 use std::sync::Arc;
 
-const KNOWN: &str = "obj, ply, serialized, rectangle, cube, sphere, disk, cylinder";
+const KNOWN: &str = "obj, ply, serialized, rectangle, cube, sphere, disk, cylinder, merge, shapegroup, instance";
 
 impl<'a> Builder<'a> {
     /// Adds a shape with its material and its light.
@@ -21,22 +23,30 @@ impl<'a> Builder<'a> {
             (None, true) => p.file()?.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
             (None, false) => node.plugin.clone(),
         };
-        let mesh = self.mesh(p)?;
+        let mesh = self.mesh(p);
         let to_world = self.placed(p)?;
         // Mitsuba takes a mirrored sphere for one of negative radius, and its other shapes not.
-        let inside_out = node.plugin == "sphere" && to_world.determinant() < 0.0;
+        let inside_out = node.plugin == "sphere" && p.transform("to_world")?.determinant() < 0.0;
         let flip = p.bool("flip_normals", false)? != inside_out;
         let face = p.bool("face_normals", false)?;
+        // An instance that mirrors takes the sides with it; where the file has normals, `append` does so anyway.
+        let by_winding = mesh.as_ref().is_ok_and(|m| face || m.normals.is_empty());
+        let flip = flip != (by_winding && self.instance_mirrors());
+        let swapped = mesh.as_ref().is_ok_and(|m| swaps_corners(m, &to_world.as_mat4(), flip, face));
+        self.current = Some(Current { node, swapped });
         let material = match p.children(Kind::Bsdf)?.as_slice() {
-            [] => self.default_material(),
-            [bsdf] => self.material(bsdf, &name)?,
+            [] => Ok(self.default_material()),
+            [bsdf] => self.material(bsdf, &name),
             [_, second, ..] => return Err(second.at.error(format!("{}: a shape has one bsdf", node.plugin))),
         };
         let emitter = match p.children(Kind::Emitter)?.as_slice() {
-            [] => None,
-            [light] => Some(self.area_emitter(light)?),
+            [] => Ok(None),
+            [light] => self.area_emitter(light).map(Some),
             [_, second, ..] => return Err(second.at.error(format!("{}: a shape has one emitter", node.plugin))),
         };
+        self.current = None;
+        let emitter = self.or_left_out(emitter, "its light is left out").map(Option::flatten);
+        let (mesh, (material, emitter)) = Error::both(mesh, Error::both(material, emitter))?;
         params.finish(&mut self.scene.warnings);
         let g = &mut self.scene.geometry;
         // A bit of a triangle's index is the tree's.
@@ -82,7 +92,7 @@ impl<'a> Builder<'a> {
 
     /// `to_world`, in the units that the command line asks for.
     pub(super) fn placed(&self, p: &mut Params<'a>) -> Result<DMat4> {
-        Ok(DMat4::from_scale(DVec3::splat(f64::from(self.unit_scale))) * p.transform("to_world")?)
+        Ok(DMat4::from_scale(DVec3::splat(f64::from(self.unit_scale))) * self.within_instance(p)?)
     }
 
     fn area_emitter(&mut self, node: &'a Node) -> Result<u32> {
@@ -92,6 +102,9 @@ impl<'a> Builder<'a> {
         let mut params = self.params(node);
         params.accept(&["sampling_weight"]);
         let radiance = self.textured(&mut params, "radiance", 1.0)?;
+        if matches!(radiance, Texture::Attribute(_)) {
+            params.warn(node.at.warning("area: of a mesh_attribute the mean is taken"));
+        }
         params.finish(&mut self.scene.warnings);
         let object = self.scene.geometry.objects.len() as u32;
         self.scene.emitters.push(Emitter::Area { object, radiance });

@@ -3,11 +3,14 @@
 use super::Builder;
 use crate::Result;
 use crate::base::math::Rgb;
-use crate::exchange::mitsuba::params::{Params, color_of, wrong};
-use crate::exchange::mitsuba::tree::{Kind, Node};
+use crate::exchange::mitsuba::params::{Params, wrong};
+use crate::exchange::mitsuba::spectrum_plugin;
+use crate::exchange::mitsuba::tree::{Kind, MAX_DEPTH, Node};
 use crate::material::Texture;
 use crate::material::texture::{Bitmap, Wrap};
 use glam::{Affine2, DMat4, Mat2, Vec2};
+
+const KNOWN: &str = "bitmap, checkerboard, mesh_attribute, uniform, d65, regular, irregular, blackbody, srgb, rawconstant";
 
 const WRAPS: [(&str, Wrap); 3] = [("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror), ("clamp", Wrap::Clamp)];
 const FILTERS: [(&str, bool); 4] = [("bilinear", false), ("nearest", true), ("trilinear", false), ("ewa", false)];
@@ -15,19 +18,30 @@ const FILTERS: [(&str, bool); 4] = [("bilinear", false), ("nearest", true), ("tr
 impl<'a> Builder<'a> {
     /// A parameter that may be textured.
     pub(super) fn textured(&mut self, params: &mut Params<'a>, name: &str, default: f32) -> Result<Texture> {
+        self.textured_within(params, name, default, 0)
+    }
+
+    fn textured_within(&mut self, params: &mut Params<'a>, name: &str, default: f32, depth: usize) -> Result<Texture> {
         let Some(p) = params.get(name) else { return Ok(Texture::Constant(Rgb::splat(default))) };
-        if let Some(color) = color_of(p, params.node)? {
+        if let Some(color) = params.color_of(p)? {
             return Ok(Texture::Constant(color));
         }
         match params.plugin_of(p)? {
-            Some(node) if node.kind == Kind::Texture => self.texture(node),
+            Some(node) if node.kind == Kind::Texture => self.texture_within(node, depth + 1),
             _ => Err(wrong(p, params.node, "a colour or a texture")),
         }
     }
 
     /// A texture plugin.
     pub(super) fn texture(&mut self, node: &'a Node) -> Result<Texture> {
+        self.texture_within(node, 0)
+    }
+
+    fn texture_within(&mut self, node: &'a Node, depth: usize) -> Result<Texture> {
         self.count(node)?;
+        if depth > MAX_DEPTH {
+            return Err(node.at.error(format!("textures are nested more than {MAX_DEPTH} deep: do they refer to themselves?")));
+        }
         let mut params = self.params(node);
         let texture = match node.plugin.as_str() {
             "bitmap" => {
@@ -50,12 +64,26 @@ impl<'a> Builder<'a> {
                 let to_uv = to_uv(&mut params)?;
                 Texture::Bitmap(Bitmap { image: self.assets.image(node)?, to_uv, nearest, wrap, scale: 1.0 })
             }
-            "checkerboard" => Texture::Checkerboard {
-                color0: params.color("color0", Rgb::splat(0.4))?,
-                color1: params.color("color1", Rgb::splat(0.2))?,
-                to_uv: to_uv(&mut params)?,
+            "checkerboard" => {
+                let colors = [
+                    self.textured_within(&mut params, "color0", 0.4, depth)?,
+                    self.textured_within(&mut params, "color1", 0.2, depth)?,
+                ];
+                Texture::Checkerboard { colors: Box::new(colors), to_uv: to_uv(&mut params)? }
+            }
+            "mesh_attribute" => self.mesh_attribute(&mut params)?,
+            // A white light whose colour varies.
+            "d65" if !params.children(Kind::Texture)?.is_empty() => match params.children(Kind::Texture)?.as_slice() {
+                [colors] => self.texture_within(colors, depth + 1)?.scaled(params.f32("scale", 1.0)?),
+                found => return Err(node.at.error(format!("d65: found {} textures, expected at most 1", found.len()))),
             },
-            _ => return Err(Self::unknown(node, "texture", "bitmap, checkerboard")),
+            plugin if spectrum_plugin::NAMES.contains(&plugin) => {
+                let color = spectrum_plugin::color(node, &mut params, false)?.unwrap_or(Rgb::ONE);
+                params = self.params(node);
+                params.accept_all();
+                Texture::Constant(color)
+            }
+            _ => return Err(Self::unknown(node, "texture", KNOWN)),
         };
         params.finish(&mut self.scene.warnings);
         Ok(texture)

@@ -1,0 +1,205 @@
+//! Image files: PNG, JPEG, BMP, TGA, HDR and EXR.
+
+use super::{Image, Pixels};
+use crate::base::math::{Rgb, linear_from_srgb};
+use crate::io::ExrImage;
+use crate::{Error, Result};
+use image::{DynamicImage, ImageFormat, ImageReader};
+use std::borrow::Cow;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Longest side of an image; a scene file that asks for more is a mistake or an attack.
+const MAX_SIDE: u32 = 32_768;
+/// Most memory that decoding an image may take, bytes.
+const MAX_BYTES: u64 = 2 << 30;
+
+/// How an image is to be taken.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ReadOptions {
+    /// Integers are linear.
+    pub raw: bool,
+    /// A file that ends early is taken as far as it goes.
+    pub allow_truncated: bool,
+}
+
+/// Reads a file, and tells what was odd about it. Integer pixels are sRGB-encoded unless `raw`; floats are linear already, those of an
+/// EXR file turned into Rec.709.
+pub fn read(path: &Path, options: ReadOptions) -> Result<(Image, Vec<String>)> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    let mut odd = Vec::new();
+    let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
+    let mut image = if is_exr { read_exr(path, &bytes, &mut odd)? } else { read_other(path, bytes, options, &mut odd)? };
+    if let Pixels::Float(pixels) = &mut image.pixels {
+        odd.extend(make_finite(pixels).map(|what| format!("{}: {what}", path.display())));
+    }
+    Ok((image, odd))
+}
+
+/// Infinities, such as a sun that half floats cannot hold, become the largest half float, or the image's largest number if that is more;
+/// what is no number becomes 0. Says what was changed.
+fn make_finite(pixels: &mut [Rgb]) -> Option<String> {
+    const LARGEST_HALF: f32 = 65504.0;
+    let largest = pixels.iter().flat_map(|p| p.to_array()).filter(|x| x.is_finite()).fold(LARGEST_HALF, f32::max);
+    let (mut infinite, mut no_number) = (0, 0);
+    for p in pixels.iter_mut().filter(|p| !p.is_finite()) {
+        infinite += usize::from(p.to_array().iter().any(|x| x.is_infinite()));
+        no_number += usize::from(p.is_nan());
+        *p = p.map(|x| if x.is_nan() { 0.0 } else { x.clamp(-largest, largest) });
+    }
+    let told = [(infinite, format!("infinite, taken for {largest}")), (no_number, "no number, taken for 0".into())];
+    let told: Vec<_> = told.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} pixels are {what}")).collect();
+    (!told.is_empty()).then(|| told.join("; "))
+}
+
+fn read_exr(path: &Path, bytes: &[u8], odd: &mut Vec<String>) -> Result<Image> {
+    let exr = ExrImage::from_bytes(path, bytes)?;
+    check_size(path, exr.width, exr.height)?;
+    let (pixels, others) = exr.picture(path)?;
+    odd.extend(others.map(|others| format!("{}: {others}", path.display())));
+    Ok(Image::new(exr.width, exr.height, pixels))
+}
+
+fn check_size(path: &Path, width: usize, height: usize) -> Result<()> {
+    match width.min(height) {
+        0 => Err(Error::input(path, format!("the image has {width} x {height} pixels"))),
+        _ => Ok(()),
+    }
+}
+
+fn read_other(path: &Path, bytes: Vec<u8>, options: ReadOptions, odd: &mut Vec<String>) -> Result<Image> {
+    let bad = |e: image::ImageError| Error::input(path, format!("not a readable image: {e}"));
+    let bytes = radiance(&bytes);
+    let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(|e| Error::io(path, e))?;
+    match reader.format() {
+        None => reader.set_format(ImageFormat::from_path(path).map_err(bad)?),
+        Some(ImageFormat::Jpeg) if !jpeg_is_whole(&bytes) => {
+            let early = "the picture's data ends early: its JPEG has no end marker";
+            if !options.allow_truncated {
+                let message = format!("{early} (viewers show it with its last rows wrong; --allow-truncated takes it so)");
+                return Err(Error::input(path, message));
+            }
+            odd.push(format!("{}: {early}; its last rows are wrong", path.display()));
+        }
+        Some(_) => {}
+    }
+    let mut limits = image::Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
+    limits.max_alloc = Some(MAX_BYTES);
+    reader.limits(limits);
+    let decoded = reader.decode().map_err(bad)?;
+    check_size(path, decoded.width() as usize, decoded.height() as usize)?;
+    Ok(linear(decoded, options.raw))
+}
+
+fn linear(decoded: DynamicImage, raw: bool) -> Image {
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    let decode = |x: f32| if raw { x } else { linear_from_srgb(x) };
+    let color = |p: &[f32]| Rgb::new(p[0], p[1], p[2]);
+    let pixels = match &decoded {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+            decoded.into_rgb32f().as_raw().chunks_exact(3).map(color).collect()
+        }
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => {
+            let rgb = decoded.into_rgb16();
+            rgb.as_raw().chunks_exact(3).map(|p| Rgb::from_array([0, 1, 2].map(|i| decode(f32::from(p[i]) / 65535.0)))).collect()
+        }
+        _ => {
+            let linear = std::array::from_fn(|i| decode(i as f32 / 255.0));
+            return Image::from_bytes(width, height, decoded.into_rgb8().into_raw(), linear);
+        }
+    };
+    Image::new(width, height, pixels)
+}
+
+/// A Radiance picture under the one name that the decoder knows: `#?RGBE` and others stand for the same.
+fn radiance(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let name = bytes.strip_prefix(b"#?").and_then(|rest| rest.iter().take(40).position(|b| *b == b'\n'));
+    match name {
+        Some(length) if !bytes.starts_with(b"#?RADIANCE") => Cow::Owned([b"#?RADIANCE", &bytes[2 + length..]].concat()),
+        _ => Cow::Borrowed(bytes),
+    }
+}
+
+/// Whether a JPEG's segments go on to the end marker: the decoder fills in what is missing without a word.
+fn jpeg_is_whole(bytes: &[u8]) -> bool {
+    let mut i = 2;
+    while let Some(&[mark, kind]) = bytes.get(i..i + 2) {
+        i += match (mark, kind) {
+            (0xff, 0xd9) => return true,
+            // Filling.
+            (0xff, 0xff) => 1,
+            // Data, a marker's byte among data, restarts.
+            (0xff, 0x00 | 0x01 | 0xd0..=0xd7) => 2,
+            (0xff, _) => match bytes.get(i + 2..i + 4) {
+                Some(length) => 2 + usize::from(u16::from_be_bytes([length[0], length[1]])),
+                None => return false,
+            },
+            _ => 1,
+        };
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image without any oddity.
+    fn read(path: &Path, raw: bool) -> Result<Image> {
+        super::read(path, ReadOptions { raw, ..ReadOptions::default() }).map(|(image, odd)| {
+            assert!(odd.is_empty(), "{odd:?}");
+            image
+        })
+    }
+
+    /// Values: Mitsuba 3.9.1, `bitmap` at a texel's centre, of 8-bit pixels (255, 228, 34) and a 16-bit grey of 17902.
+    #[test]
+    fn integers_are_srgb_unless_raw_and_alpha_is_dropped() {
+        let dir = tempfile::tempdir().unwrap();
+        let rgba = dir.path().join("a.png");
+        image::RgbaImage::from_pixel(2, 1, image::Rgba([255, 228, 34, 160])).save(&rgba).unwrap();
+        let p = read(&rgba, false).unwrap().pixel(1, 0);
+        assert!((p - Rgb::new(1.0, 0.775_822, 0.015_996)).abs().max_element() < 1e-5, "{p}");
+        let p = read(&rgba, true).unwrap().pixel(1, 0);
+        assert!((p - Rgb::new(1.0, 0.894_118, 0.133_333)).abs().max_element() < 1e-5, "{p}");
+        let grey = dir.path().join("g.png");
+        image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(1, 1, image::Luma([17902])).save(&grey).unwrap();
+        let p = read(&grey, false).unwrap().pixel(0, 0);
+        assert!((p - Rgb::splat(0.060_64)).abs().max_element() < 3e-5, "{p}");
+    }
+
+    #[test]
+    fn floats_are_linear_in_every_container() {
+        let dir = tempfile::tempdir().unwrap();
+        let color = Rgb::new(0.5, 4.0, 0.25);
+        let exr = dir.path().join("a.exr");
+        ExrImage::new(1, 2).with_rgb("", &[color; 2]).write(&exr).unwrap();
+        assert_eq!(read(&exr, false).unwrap(), Image::new(1, 2, vec![color; 2]));
+        let hdr = dir.path().join("a.hdr");
+        image::Rgb32FImage::from_pixel(1, 1, image::Rgb(color.to_array())).save(&hdr).unwrap();
+        assert!((read(&hdr, false).unwrap().pixel(0, 0) - color).abs().max_element() < 0.03);
+        let grey = dir.path().join("y.exr");
+        ExrImage::new(1, 1).with_f32("depth", vec![3.0]).write(&grey).unwrap();
+        assert_eq!(read(&grey, true).unwrap().pixel(0, 0), Rgb::splat(3.0));
+    }
+
+    #[test]
+    fn broken_images_name_their_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        image::RgbImage::new(16, 16).save(&path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        // A header that promises a billion pixels.
+        let mut bomb = bytes.clone();
+        bomb[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
+        for content in [&bytes[..bytes.len() / 2], b"nonsense", b"", &bomb] {
+            std::fs::write(&path, content).unwrap();
+            let message = read(&path, false).unwrap_err().to_string();
+            assert!(message.contains("a.png"), "{message}");
+        }
+    }
+}
