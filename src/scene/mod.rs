@@ -7,6 +7,7 @@ pub mod geometry;
 pub mod mesh;
 pub mod normals;
 pub mod primitives;
+pub mod round;
 
 use crate::material::Material;
 use std::path::PathBuf;
@@ -14,6 +15,7 @@ use std::path::PathBuf;
 pub use camera::Camera;
 pub use emitter::Emitter;
 pub use geometry::{Geometry, Object};
+pub use round::Round;
 
 /// A loaded scene. Everything is in world space and scene units times `--unit-scale`.
 #[derive(Debug, Default)]

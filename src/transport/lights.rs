@@ -7,6 +7,7 @@
 
 use super::envmap::Envmap;
 use super::light_tree::{LightBounds, LightTree, Receiver};
+use super::round_light;
 use crate::base::math::{Rgb, luminance};
 use crate::material::{Surface, Texture};
 use crate::scene::normals::unit_normal;
@@ -31,6 +32,8 @@ pub struct Lights {
 #[derive(Debug)]
 pub(crate) enum Near {
     Triangle(LightTriangle),
+    /// Index into `Geometry::rounds`.
+    Round(u32),
     /// Point or spot: index into `Scene::emitters`.
     Delta(u32),
 }
@@ -83,6 +86,11 @@ impl Lights {
                     let mean = luminance(radiance.mean());
                     if mean > 0.0 && mean.is_finite() {
                         this.first[i] = Some(this.near.len() as u32);
+                        if let Some(round) = scene.geometry.round(object.triangles.start) {
+                            bounds.push(round_light::bounds(&scene.geometry.rounds[round as usize], mean));
+                            this.near.push(Near::Round(round));
+                            continue;
+                        }
                         for t in object.triangles.clone() {
                             let triangle = LightTriangle::new(&scene.geometry, t, i as u32);
                             bounds.push(triangle.bounds(&scene.geometry, object, mean));
@@ -142,6 +150,12 @@ impl Lights {
         let probability = probability / shares as f32;
         match &self.near[index as usize] {
             Near::Triangle(triangle) => triangle.sample(scene, receiver.p, probability, v),
+            Near::Round(round) => {
+                let round = &scene.geometry.rounds[*round as usize];
+                let emitter = scene.geometry.objects[round.object as usize].emitter?;
+                let Emitter::Area { radiance, .. } = &scene.emitters[emitter as usize] else { return None };
+                round_light::sample(round, radiance, receiver.p, probability, v)
+            }
             Near::Delta(emitter) => {
                 let mut sample = sample_delta(&scene.emitters[*emitter as usize], receiver.p)?;
                 sample.weight /= probability;
@@ -163,6 +177,10 @@ impl Lights {
     /// Density with which [`Lights::sample`] finds the emitting point `s`.
     pub fn pdf_surface(&self, scene: &Scene, receiver: &Receiver, s: &Surface) -> f32 {
         let Some(first) = s.emitter.and_then(|e| self.first.get(e as usize).copied().flatten()) else { return 0.0 };
+        if let Some(Near::Round(round)) = self.near.get(first as usize) {
+            let round = &scene.geometry.rounds[*round as usize];
+            return self.share() * self.tree.probability(receiver, first) * round_light::pdf(round, receiver.p, s.p);
+        }
         let index = first + (s.triangle - scene.geometry.objects[s.object as usize].triangles.start);
         let Some(Near::Triangle(triangle)) = self.near.get(index as usize) else { return 0.0 };
         let to_light = s.p - receiver.p;

@@ -52,7 +52,11 @@ impl World {
 
     /// The surface that a hit lies on.
     pub fn surface(&self, hit: &Hit) -> Surface {
-        self.facets[hit.triangle as usize].surface(hit)
+        let facet = &self.facets[hit.triangle as usize];
+        match facet.round(&self.scene.geometry) {
+            None => facet.surface(hit),
+            Some(round) => facet.surface_of(round, hit),
+        }
     }
 
     /// Whether something blocks a ray.

@@ -90,6 +90,8 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
 pub(crate) fn near(world: &World) -> Vec<GpuNear> {
     let of = |near: &Near| match near {
         Near::Triangle(t) => GpuNear { triangle: t.index, emitter: t.emitter, area: t.area, padding: 0 },
+        // Refused before it comes here.
+        Near::Round(_) => GpuNear { triangle: NONE, emitter: NONE, ..GpuNear::default() },
         Near::Delta(emitter) => GpuNear { triangle: NONE, emitter: *emitter, ..GpuNear::default() },
     };
     world.lights.near.iter().map(of).collect()

@@ -116,6 +116,12 @@ impl GpuScene {
                 material.name
             )));
         }
+        if !world.scene.geometry.rounds.is_empty() {
+            return Err(Error::Request(format!(
+                "{} spheres, cylinders and disks are too many for fine meshes, and the GPU has no round shapes; use --device cpu",
+                world.scene.geometry.rounds.len()
+            )));
+        }
         let (nodes, corners) = tree(world)?;
         let facets: Vec<[u32; 28]> = world.facets.iter().map(words).collect();
         let (mut textures, mut tables) = (Textures::default(), Tables::default());

@@ -2,6 +2,7 @@
 
 mod bsdf;
 mod emitter;
+mod round;
 mod sensor;
 mod shape;
 mod texture;
@@ -10,6 +11,7 @@ use super::assets::{Assets, ids};
 use super::params::{Ids, Params};
 use super::tree::{Kind, Node, Value};
 use super::{hash, json, xml};
+use round::Crowd;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
@@ -49,7 +51,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         default_material: None,
         built: 0,
         environments: 0,
+        crowd: Crowd::new(),
     };
+    builder.crowd = builder.crowd(&children);
     if is_json && !options.defines.is_empty() {
         builder.scene.warnings.push(format!("{}: JSON scenes have no parameters: --define is ignored", path.display()));
     }
@@ -88,6 +92,8 @@ struct Builder<'a> {
     built: usize,
     /// Environment emitters so far; Mitsuba allows one.
     environments: usize,
+    /// Round shapes that are too many for fine meshes.
+    crowd: Crowd,
 }
 
 impl<'a> Builder<'a> {

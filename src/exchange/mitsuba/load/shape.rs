@@ -1,6 +1,7 @@
 //! Shape plugins.
 
 use super::Builder;
+use super::round::{cylinder, described};
 use crate::Result;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node};
@@ -21,8 +22,14 @@ impl<'a> Builder<'a> {
             (None, true) => p.file()?.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
             (None, false) => node.plugin.clone(),
         };
-        let mesh = self.mesh(p)?;
-        let to_world = self.placed(p)?;
+        let round = match self.crowd.get(&(node as *const Node)) {
+            Some(&cells) => self.round_space(p)?.map(|(kind, to_world)| (kind, to_world, cells)),
+            None => None,
+        };
+        let (mesh, to_world) = match round {
+            Some((kind, to_world, cells)) => (kind.mesh(cells), to_world),
+            None => (self.mesh(p)?, self.placed(p)?),
+        };
         // Mitsuba takes a mirrored sphere for one of negative radius, and its other shapes not.
         let inside_out = node.plugin == "sphere" && to_world.determinant() < 0.0;
         let flip = p.bool("flip_normals", false)? != inside_out;
@@ -44,7 +51,11 @@ impl<'a> Builder<'a> {
         if g.positions.len() + mesh.positions.len() > most || g.triangles.len() + mesh.triangles.len() > most {
             return Err(node.at.error(format!("the scene has more than {most} vertices or triangles")));
         }
-        append(g, mesh, to_world.as_mat4(), flip, face, name, material, emitter);
+        if let Some((kind, to_world, cells)) = round {
+            let (first, object) = (g.triangles.len() as u32, g.objects.len() as u32);
+            g.rounds.push(described(kind, to_world, cells, flip, first, object));
+        }
+        append(g, mesh, to_world.as_mat4(), flip, face && round.is_none(), name, material, emitter);
         Ok(())
     }
 
@@ -70,11 +81,8 @@ impl<'a> Builder<'a> {
                 primitives::sphere(center, p.positive("radius", 1.0)?)
             }
             "cylinder" => {
-                let (p0, p1) = (p.vector("p0")?.unwrap_or(Vec3::ZERO), p.vector("p1")?.unwrap_or(Vec3::Z));
-                if p0 == p1 {
-                    return Err(p.at("p1").error("cylinder: p0 and p1 are the same point"));
-                }
-                primitives::cylinder(p0, p1, p.positive("radius", 1.0)?)
+                let (p0, p1, radius) = cylinder(p)?;
+                primitives::cylinder(p0, p1, radius as f32)
             }
             _ => return Err(Self::unknown(p.node, "shape", KNOWN)),
         })
