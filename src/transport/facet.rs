@@ -4,8 +4,8 @@ use crate::base::math::Frame;
 use crate::base::ray::Hit;
 use crate::material::Surface;
 use crate::material::surface::ray_offset;
-use crate::scene::{Geometry, Round};
 use crate::scene::normals::unit_normal;
+use crate::scene::{Geometry, Round};
 use glam::{Vec2, Vec3};
 use std::num::NonZeroU32;
 

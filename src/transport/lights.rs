@@ -108,8 +108,13 @@ impl Lights {
                     bounds.push(delta_bounds(*position, *intensity, Vec3::Z, PI, PI));
                     this.near.push(Near::Delta(i as u32));
                 }
-                Emitter::Spot { position, direction, intensity, cutoff_rad, .. } => {
-                    bounds.push(delta_bounds(*position, *intensity, *direction, 0.0, *cutoff_rad));
+                Emitter::Spot { position, direction, intensity, cutoff_rad, pattern, .. } => {
+                    let mean = pattern.as_ref().map_or(Rgb::ONE, |p| p.texture.mean());
+                    bounds.push(delta_bounds(*position, *intensity * mean, *direction, 0.0, *cutoff_rad));
+                    this.near.push(Near::Delta(i as u32));
+                }
+                Emitter::Projector { position, direction, image, cutoff_rad } => {
+                    bounds.push(delta_bounds(*position, image.texture.mean() * PI, *direction, 0.0, *cutoff_rad));
                     this.near.push(Near::Delta(i as u32));
                 }
             }
@@ -311,27 +316,39 @@ impl Environment {
 
 /// Irradiance that a delta emitter sends to a surface at `p` that faces it, as the `weight` of a sample.
 fn sample_delta(emitter: &Emitter, p: Vec3) -> Option<LightSample> {
-    let (point, intensity, cone) = match *emitter {
+    let (point, intensity, falloff) = match emitter {
         Emitter::Directional { direction, irradiance } => {
             let sample = LightSample {
-                wi: -direction,
+                wi: -*direction,
                 distance: f32::INFINITY,
                 point: Vec3::ZERO,
-                weight: irradiance,
+                weight: *irradiance,
                 pdf: 1.0,
                 delta: true,
             };
             return Some(sample);
         }
-        Emitter::Point { position, intensity } => (position, intensity, None),
-        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad } => {
-            (position, intensity, Some((direction, cutoff_rad, beam_rad)))
+        Emitter::Point { position, intensity } => (*position, *intensity, 1.0),
+        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad, pattern } => {
+            let cos = direction.dot((p - *position).try_normalize()?);
+            let colour = pattern.as_ref().map_or(Rgb::ONE, |t| t.texture.eval(t.uv(t.to_local.transform_point3(p))));
+            (*position, *intensity * colour, spot_falloff(cos, *cutoff_rad, *beam_rad))
+        }
+        Emitter::Projector { position, direction, image, .. } => {
+            let local = image.to_local.transform_point3(p);
+            let uv = image.uv(local);
+            if local.z <= 0.0 || !(uv.cmpge(Vec2::ZERO) & uv.cmple(Vec2::ONE)).all() {
+                return None;
+            }
+            // As Mitsuba: irradiance falls with the squared depth; a surface that faces the axis gets what the image says.
+            let to_point = p - *position;
+            let scale = PI * to_point.length().powi(3) / (local.z * local.z * direction.dot(to_point));
+            (*position, image.texture.eval(uv), scale)
         }
         Emitter::Area { .. } | Emitter::Envmap { .. } | Emitter::Constant { .. } => return None,
     };
     let distance = point.distance(p);
     let wi = (point - p).try_normalize()?;
-    let falloff = cone.map_or(1.0, |(axis, cutoff, beam)| spot_falloff(axis.dot(-wi), cutoff, beam));
     let weight = intensity * (falloff / (distance * distance));
     (falloff > 0.0).then_some(LightSample { wi, distance, point, weight, pdf: 1.0, delta: true })
 }
@@ -365,6 +382,7 @@ mod tests {
     fn lamp(y: f32, others: Vec<Emitter>) -> Scene {
         let corner = |x: f32, z: f32| Vec3::new(x, y, z);
         let geometry = Geometry {
+            rounds: Vec::new(),
             positions: vec![corner(-1.0, -2.0), corner(1.0, -2.0), corner(1.0, 2.0), corner(-1.0, 2.0)],
             normals: vec![Vec3::NEG_Y; 4],
             uvs: vec![Vec2::ZERO; 4],
@@ -389,6 +407,7 @@ mod tests {
     fn spot_point_and_directional_are_those_of_mitsuba() {
         // Mitsuba 3.9.1: cutoff 40, beam 25 degrees, from (0, 3, 0) to (1, 0, 0.5).
         let spot = Emitter::Spot {
+            pattern: None,
             position: Vec3::new(0.0, 3.0, 0.0),
             direction: Vec3::new(1.0, -3.0, 0.5).normalize(),
             intensity: Rgb::new(5.0, 4.0, 3.0),

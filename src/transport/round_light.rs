@@ -164,7 +164,10 @@ mod tests {
             }
             // Half a million scrambled Sobol points: the error is far below that of independent ones, 1 / sqrt(N) = 1.4e-3.
             assert!((told / seen - 1.0).abs() < 4e-3, "{kind:?} {scale} from {p}: {told}, {seen} sr are seen");
-            assert!(kind != RoundKind::Sphere || inwards || (pdfs - 1.0).abs() < 4e-3, "{kind:?} {scale}: density sums to {pdfs}");
+            assert!(
+                kind != RoundKind::Sphere || inwards || (pdfs - 1.0).abs() < 4e-3,
+                "{kind:?} {scale}: density sums to {pdfs}"
+            );
         }
     }
 }

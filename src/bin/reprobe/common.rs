@@ -45,6 +45,18 @@ pub struct Common {
 /// A scene's file and its opaque part.
 type SceneSlot = Mutex<Option<(PathBuf, Arc<World>)>>;
 
+/// Depth from which on what longer paths carry is not worth a word.
+const LONG_PATH: u32 = 64;
+
+/// Sizes that scenes in metres have.
+const METRES: std::ops::RangeInclusive<f32> = 0.1..=10_000.0;
+
+/// A power of ten that would make a scene of this size, too small or too large to be in metres, a room.
+fn scale_to_metres(across: f32) -> Option<f32> {
+    let is_odd = across > 0.0 && across.is_finite() && !METRES.contains(&across);
+    is_odd.then(|| 10f32.powi(1 - across.log10().ceil() as i32))
+}
+
 /// `--shard I/N`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shard {
@@ -139,7 +151,20 @@ impl Common {
         if let Some((_, world)) = slot.as_ref().filter(|(p, _)| p == path) {
             return Ok(world.clone());
         }
-        let (world, left_out) = World::opaque(self.load_scene(path)?);
+        let scene = self.load_scene(path)?;
+        if let Some(depth) = scene.max_depth.filter(|&depth| depth < LONG_PATH) {
+            let at = &scene.max_depth_at;
+            eprintln!("reprobe: warning: {at}: max_depth = {depth} counts for path-trace alone: bakes follow paths to their end");
+        }
+        let (low, high) = scene.geometry.bounds();
+        if let Some(scale) = scale_to_metres(low.distance(high)) {
+            eprintln!(
+                "reprobe: warning: {} is {:.1e} across, and bakes count in metres: if that is not so, give every command --unit-scale {scale:e}",
+                path.display(),
+                low.distance(high)
+            );
+        }
+        let (world, left_out) = World::opaque(scene);
         if left_out > 0 {
             eprintln!(
                 "reprobe: warning: {left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces"

@@ -5,7 +5,7 @@ use crate::frames::{self, with_layers};
 use crate::render_path::{Args, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
-use crate::views::{View, largest};
+use crate::views::{View, largest, on_gpu};
 use anyhow::{Context, bail};
 use reprobe::base::math::Rgb;
 use reprobe::base::progress::Progress;
@@ -138,6 +138,7 @@ fn ulr_on_gpu(
     timings: &mut Timings,
 ) -> anyhow::Result<Option<Ulr>> {
     let ulr = common.on_gpu(|gpu| {
+        on_gpu(&setup.world.scene, &setup.views)?;
         let mut ulr = Ulr::new(gpu, &setup.world, setup.lightmap.as_ref(), params, args.gpu_memory)?;
         ulr.reserve(largest(&setup.views), probe)?;
         Ok(ulr)
@@ -153,7 +154,10 @@ pub fn run_image_space_gather(args: &Args, common: &Common, mut timings: Timings
     let base = apply(&ImageSpaceGatherParams { samples: args.samples.unwrap_or(base.samples), ..base }, &args.set)?;
     let setup = Setup::new(args, common, &mut timings, base.supersample)?;
     let lightmap = setup.lightmap(&timings.method)?;
-    let mut gpu = common.on_gpu(|gpu| ImageSpaceGather::new(gpu, &setup.world, lightmap, base.supersample))?;
+    let mut gpu = common.on_gpu(|gpu| {
+        on_gpu(&setup.world.scene, &setup.views)?;
+        ImageSpaceGather::new(gpu, &setup.world, lightmap, base.supersample)
+    })?;
     if let Some(gpu) = &gpu {
         timings.on_gpu(gpu.device(), gpu.has_clock());
     }
@@ -187,7 +191,10 @@ pub fn run_lightmap_rt(args: &Args, common: &Common, mut timings: Timings) -> an
     let base = apply(&LightmapRtParams { samples: args.samples.unwrap_or(base.samples), bounces, ..base }, &args.set)?;
     let setup = Setup::new(args, common, &mut timings, base.supersample)?;
     let lightmap = setup.lightmap(&timings.method)?;
-    let mut gpu = common.on_gpu(|gpu| LightmapRt::new(gpu, &setup.world, lightmap, &base))?;
+    let mut gpu = common.on_gpu(|gpu| {
+        on_gpu(&setup.world.scene, &setup.views)?;
+        LightmapRt::new(gpu, &setup.world, lightmap, &base)
+    })?;
     timings.device = gpu.as_ref().map(|g| g.device().to_owned());
     let with = |samples| LightmapRtParams { samples, ..base };
     let mut render = |view: &View, samples: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {

@@ -4,7 +4,7 @@ use crate::common::{Common, Outcome};
 use crate::render_path::{Args, describe, finish, is_finished, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
-use crate::views::largest;
+use crate::views::{self, largest};
 use anyhow::{Context, bail};
 use reprobe::base::progress::Progress;
 use reprobe::io::provenance::hash_file;
@@ -78,6 +78,7 @@ pub fn run(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result
     if !kept {
         let scale = probes.set.roughness_scale;
         let on_gpu = common.on_gpu(|gpu| {
+            views::on_gpu(scene, &wanted)?;
             let memory = args.gpu_memory;
             let mut renderer = GpuRenderer::new(gpu, &world, &curvature, lightmap.as_ref(), params.clone(), scale, memory)?;
             renderer.reserve(largest(&wanted), probes.set.size)?;

@@ -4,7 +4,7 @@ use crate::common::{Common, Outcome, parse_bytes, parse_size};
 use crate::frames::{self, with_layers};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
-use crate::views::{FrameList, View, parse_frames, views};
+use crate::views::{FrameList, View, on_gpu, parse_frames, refuse_parallel, views};
 use crate::{render_baseline, render_glossy};
 use anyhow::bail;
 use clap::ValueEnum;
@@ -15,6 +15,8 @@ use reprobe::method::path_trace::denoise::{DenoiseParams, denoise, guides};
 use reprobe::method::path_trace::denoise_gpu::Denoiser;
 use reprobe::method::path_trace::gpu::PathTracer;
 use reprobe::method::path_trace::{PathTraceParams, path_trace, path_trace_full};
+use reprobe::scene::camera::ALL_DEPTHS;
+use reprobe::scene::film::Filter;
 use reprobe::scene::{Camera, Scene};
 use reprobe::transport::World;
 use reprobe::transport::path::PathParams;
@@ -46,7 +48,7 @@ pub struct Args {
     /// Samples a pixel of lightmap-rt (glossy rays at the first vertex, default 4) or image-space-gather (taps, default 64)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub samples: Option<u32>,
-    /// Most scattering vertices of a path [default: unbounded; lightmap-rt: 3]
+    /// Most scattering vertices of a path [default: the scene's max_depth less one; lightmap-rt: 3]
     #[arg(long, value_name = "N")]
     pub max_depth: Option<u32>,
     /// path-trace: filter the layers, guided by albedo, normal and depth
@@ -64,6 +66,11 @@ pub struct Args {
     /// path-trace: what to write
     #[arg(long, value_enum, default_value = "all")]
     layers: LayerChoice,
+    /// path-trace: filter of the image and all its layers. Frames of the other methods, and references of evaluate and
+    /// scripts/mitsuba_reference.py, are box-filtered, and only like can be compared with like; for the image that Mitsuba would
+    /// make of the scene, take its film's filter
+    #[arg(long, value_enum, value_name = "FILTER")]
+    rfilter: Option<RFilter>,
     /// Only these frames of the path
     #[arg(long, value_name = "LIST", value_parser = parse_frames)]
     frames: Option<FrameList>,
@@ -128,6 +135,14 @@ pub enum Aov {
     All,
 }
 
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum RFilter {
+    /// The pixel's own square [default]
+    Box,
+    /// The filter of the scene's film; where it names none, Mitsuba's Gaussian of half a pixel
+    Scene,
+}
+
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 enum LayerChoice {
@@ -139,7 +154,7 @@ enum LayerChoice {
 
 pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     let timings = Timings {
-        method: args.method.to_possible_value().map_or_else(String::new, |v| v.get_name().into()),
+        method: name_of(args.method),
         threads: rayon::current_num_threads(),
         clock: "cpu".into(),
         ..Timings::default()
@@ -150,6 +165,9 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     if args.method == Method::GlossyProbes && (args.budget_ms.is_some() || args.match_time.is_some()) {
         bail!("--method glossy-probes has no sample count that a budget could choose");
     }
+    if args.rfilter == Some(RFilter::Scene) && args.method != Method::PathTrace {
+        bail!("--rfilter scene is for --method path-trace alone: the other methods' frames are box-filtered");
+    }
     match args.method {
         Method::GlossyProbes => render_glossy::run(args, common, timings),
         Method::PathTrace => run_path_trace(args, common, timings),
@@ -159,13 +177,38 @@ pub fn run(args: &Args, common: &Common) -> anyhow::Result<Outcome> {
     }
 }
 
+fn name_of(method: Method) -> String {
+    method.to_possible_value().map_or_else(String::new, |v| v.get_name().into())
+}
+
 /// The views that the command line asks for.
 pub fn views_of(args: &Args, common: &Common, scene: &Scene) -> anyhow::Result<Vec<View>> {
-    views(common, scene, args.path.as_deref(), args.size, args.frames.as_ref())
+    let views = views(common, scene, args.path.as_deref(), args.size, args.frames.as_ref())?;
+    if args.method != Method::PathTrace {
+        refuse_parallel(&views, &name_of(args.method))?;
+    }
+    Ok(views)
+}
+
+/// The filter of path-traced frames; says so where the film's is another and nobody has chosen.
+fn filter_of(args: &Args, scene: &Scene) -> Filter {
+    let film = &scene.film_filter;
+    if args.rfilter == Some(RFilter::Scene) {
+        return film.filter;
+    }
+    if let (None, Some(named), true) = (args.rfilter, &film.named, film.filter != Filter::Box) {
+        eprintln!("reprobe: warning: the film's filter, {named}, is not used, but a box: see --rfilter");
+    }
+    Filter::Box
+}
+
+/// Depth and roulette: the command line's, or else the scene's.
+fn path_params(args: &Args, scene: &Scene) -> PathParams {
+    let of_scene = PathParams::of(scene);
+    PathParams { max_depth: args.max_depth.unwrap_or(of_scene.max_depth), ..of_scene }
 }
 
 fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow::Result<Outcome> {
-    let path = PathParams { max_depth: args.max_depth.unwrap_or(u32::MAX), ..PathParams::default() };
     let denoiser = args.denoise.then(|| apply(&DenoiseParams::default(), &args.set)).transpose()?;
     if args.denoise && args.layers == LayerChoice::Full {
         bail!("--denoise filters layer by layer: leave --layers full out");
@@ -176,10 +219,15 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
         bail!("{}: has no emitter; every frame would be black", args.scene.display());
     }
     let views = views_of(args, common, &scene)?;
+    let (path, filter) = (path_params(args, &scene), filter_of(args, &scene));
     let (world, build_ms) = timed(|| World::new(scene));
     (timings.load_ms, timings.build_ms) = (load_ms, build_ms);
 
     let on_gpu = common.on_gpu(|gpu| {
+        on_gpu(&world.scene, &views)?;
+        if filter != Filter::Box {
+            return Err(reprobe::Error::Request("the GPU's path tracer has a box filter alone; use --device cpu".into()));
+        }
         let scene = Arc::new(GpuScene::new(gpu, &world)?);
         let denoiser = denoiser.map(|d| Denoiser::new(scene.clone(), &d)).transpose()?;
         Ok((PathTracer::new(scene, &path, args.layers == LayerChoice::All)?, denoiser))
@@ -187,13 +235,13 @@ fn run_path_trace(args: &Args, common: &Common, mut timings: Timings) -> anyhow:
     let (tracer, gpu_denoiser) = on_gpu.map_or((None, None), |(tracer, denoiser)| (Some(tracer), denoiser));
     timings.device = tracer.as_ref().map(|t| t.device().to_owned());
     let parameters = |spp| match &denoiser {
-        None => json!({ "path_trace": PathTraceParams { spp, path }, "layers": args.layers }),
-        Some(d) => json!({ "path_trace": PathTraceParams { spp, path }, "layers": args.layers, "denoise": d }),
+        None => json!({ "path_trace": PathTraceParams { spp, path, filter }, "layers": args.layers }),
+        Some(d) => json!({ "path_trace": PathTraceParams { spp, path, filter }, "layers": args.layers, "denoise": d }),
     };
     let seed = common.seed;
     let mut render = |view: &View, spp: u32, image: ExrImage, times: &mut FrameTimings, bar: &dyn Progress| {
         let View { frame, camera } = view;
-        let params = PathTraceParams { spp, path };
+        let params = PathTraceParams { spp, path, filter };
         if args.layers == LayerChoice::Full {
             let full = times.pass("path_trace", || match &tracer {
                 Some(tracer) => tracer.full(camera, spp, seed, *frame, bar),
@@ -242,8 +290,20 @@ pub fn is_finished(path: &Path, provenance: &Provenance) -> bool {
 
 /// The camera, as provenance keeps it.
 pub fn describe(camera: &Camera) -> serde_json::Value {
-    json!({
+    let mut described = json!({
         "to_world": camera.to_world.to_cols_array(), "fov_x_rad": camera.fov_x, "size": camera.size,
         "aperture_radius": camera.aperture_radius, "focus_distance": camera.focus_distance,
-    })
+    });
+    // What few cameras have is said of those alone, so that the others' finished frames stay finished.
+    if camera.shift != glam::Vec2::ZERO {
+        described["shift"] = json!(camera.shift.to_array());
+    }
+    if camera.clip != ALL_DEPTHS {
+        // Infinity is no number of JSON's.
+        described["clip"] = json!(camera.clip.map(|depth| depth.to_string()));
+    }
+    if let Some(half) = camera.orthographic {
+        described["orthographic"] = json!(half.to_array());
+    }
+    described
 }

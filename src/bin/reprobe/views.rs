@@ -68,6 +68,19 @@ pub fn views(
     Ok(views)
 }
 
+/// An error where a GPU cannot render these views.
+pub fn on_gpu(scene: &Scene, views: &[View]) -> reprobe::Result<()> {
+    reprobe::gpu::camera::check(scene, views.iter().map(|v| &v.camera))
+}
+
+/// An error where a view has parallel rays, which only the path tracer knows.
+pub fn refuse_parallel(views: &[View], method: &str) -> anyhow::Result<()> {
+    if views.iter().any(|v| v.camera.orthographic.is_some()) {
+        bail!("--method {method} has no orthographic camera: use --method path-trace, or give a camera path with --path");
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

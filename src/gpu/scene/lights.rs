@@ -67,7 +67,7 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
         Emitter::Point { position, intensity } => {
             GpuEmitter { kind: POINT, position: position.to_array(), color: intensity.to_array(), ..GpuEmitter::default() }
         }
-        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad } => GpuEmitter {
+        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad, .. } => GpuEmitter {
             kind: SPOT,
             position: position.to_array(),
             direction: direction.to_array(),
@@ -82,6 +82,8 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
             color: irradiance.to_array(),
             ..GpuEmitter::default()
         },
+        // Refused before it comes here.
+        Emitter::Projector { .. } => GpuEmitter::default(),
         Emitter::Envmap { .. } | Emitter::Constant { .. } => GpuEmitter { kind: AT_INFINITY, ..GpuEmitter::default() },
     };
     world.scene.emitters.iter().enumerate().map(of).collect()

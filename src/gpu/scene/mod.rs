@@ -7,6 +7,7 @@ mod textures;
 use super::Gpu;
 use crate::lightmap::LightMap;
 use crate::material::bsdf::{Distribution, albedo};
+use crate::scene::Emitter;
 use crate::transport::World;
 use crate::transport::facet::Facet;
 use crate::{Error, Result};
@@ -121,6 +122,11 @@ impl GpuScene {
                 "{} spheres, cylinders and disks are too many for fine meshes, and the GPU has no round shapes; use --device cpu",
                 world.scene.geometry.rounds.len()
             )));
+        }
+        let is_pattern = |e: &Emitter| matches!(e, Emitter::Projector { .. } | Emitter::Spot { pattern: Some(_), .. });
+        if world.scene.emitters.iter().any(is_pattern) {
+            let message = "the GPU has no projector and no spot with a texture; use --device cpu";
+            return Err(Error::Request(message.into()));
         }
         let (nodes, corners) = tree(world)?;
         let facets: Vec<[u32; 28]> = world.facets.iter().map(words).collect();

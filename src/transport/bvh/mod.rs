@@ -26,9 +26,9 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use round::RoundTree;
 #[cfg(target_arch = "x86_64")]
 use simd::{Avx2, Avx512, Portable, Simd};
-use round::RoundTree;
 use std::cell::RefCell;
 use traverse::STACK;
 use wide::Tree;
@@ -68,7 +68,8 @@ impl Bvh {
         let masked = |t| has_opacity.get(geometry.object(t).material as usize).copied().unwrap_or(false);
         let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
         let margin = extent * BOX_MARGIN;
-        let round_extent = geometry.rounds.iter().flat_map(Round::bounds).fold(extent, |m, p| m.max(p.abs().max_element() as f32));
+        let round_extent =
+            geometry.rounds.iter().flat_map(Round::bounds).fold(extent, |m, p| m.max(p.abs().max_element() as f32));
         Self {
             tree: Tree::new(&triangle_tree(geometry, &kept, margin), &kept, geometry, &masked),
             rounds: RoundTree::build(geometry, keep, round_extent * BOX_MARGIN),

@@ -2,6 +2,7 @@
 
 mod bsdf;
 mod emitter;
+mod integrator;
 mod round;
 mod sensor;
 mod shape;
@@ -9,11 +10,11 @@ mod texture;
 
 use super::assets::{Assets, ids};
 use super::params::{Ids, Params};
-use super::tree::{Kind, Node, Value};
+use super::tree::{Kind, Node, Param, Value};
 use super::{hash, json, xml};
-use round::Crowd;
 use crate::scene::Scene;
 use crate::{Error, Result};
+use round::Crowd;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -44,16 +45,18 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let hash = hash::scene(&children, &ids, &assets, options.unit_scale);
     let mut builder = Builder {
         ids: &ids,
+        children: &children,
         assets: &assets,
         unit_scale: options.unit_scale,
         scene: Scene { hash, path: path.to_owned(), ..Scene::default() },
         materials: BTreeMap::new(),
         default_material: None,
+        lamp_material: None,
         built: 0,
         environments: 0,
         crowd: Crowd::new(),
     };
-    builder.crowd = builder.crowd(&children);
+    builder.crowd = builder.crowd();
     if is_json && !options.defines.is_empty() {
         builder.scene.warnings.push(format!("{}: JSON scenes have no parameters: --define is ignored", path.display()));
     }
@@ -66,6 +69,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         }
     }
     let mut scene = builder.scene;
+    if let Some(sensor) = &mut scene.sensor {
+        sensor.drop_idle_clip(&scene.geometry);
+    }
     if scene.geometry.triangles.is_empty() {
         return Err(Error::input(path, "the scene has no triangles"));
     }
@@ -82,12 +88,16 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
 /// Builds a scene plugin by plugin.
 struct Builder<'a> {
     ids: &'a Ids<'a>,
+    /// What stands directly under the scene.
+    children: &'a [Param],
     assets: &'a Assets,
     unit_scale: f32,
     scene: Scene,
     /// Material of each scattering model that stands by itself, by its place in memory: looked up, never listed.
     materials: BTreeMap<*const Node, u32>,
     default_material: Option<u32>,
+    /// Of emitting shapes without a scattering model.
+    lamp_material: Option<u32>,
     /// Scattering models and textures so far.
     built: usize,
     /// Environment emitters so far; Mitsuba allows one.
@@ -113,11 +123,7 @@ impl<'a> Builder<'a> {
             }
             // A texture acts where something refers to it; still, a wrong one should not pass.
             Kind::Texture => self.texture(node).map(|_| ()),
-            Kind::Integrator => {
-                let depth = self.params(node).integer("max_depth", -1, -1, i64::from(u32::MAX))?;
-                self.scene.max_depth = u32::try_from(depth).ok();
-                Ok(())
-            }
+            Kind::Integrator => self.integrator(node),
             Kind::Film | Kind::Other => Ok(()),
         }
     }

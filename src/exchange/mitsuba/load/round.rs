@@ -4,7 +4,7 @@ use super::Builder;
 use crate::Result;
 use crate::base::math::Frame;
 use crate::exchange::mitsuba::params::Params;
-use crate::exchange::mitsuba::tree::{Kind, Node, Param, Value};
+use crate::exchange::mitsuba::tree::{Kind, Node, Value};
 use crate::scene::Round;
 use crate::scene::primitives;
 use crate::scene::round::RoundKind;
@@ -20,9 +20,9 @@ pub(super) type Crowd = BTreeMap<*const Node, [u32; 2]>;
 
 impl<'a> Builder<'a> {
     /// Shares [`FINE_TRIANGLES`] out by area where fine meshes would take more.
-    pub(super) fn crowd(&self, children: &'a [Param]) -> Crowd {
+    pub(super) fn crowd(&self) -> Crowd {
         let mut found = Vec::new();
-        for child in children {
+        for child in self.children {
             let Value::Plugin(node) = &child.value else { continue };
             if node.kind != Kind::Shape {
                 continue;

@@ -3,8 +3,11 @@
 use super::Builder;
 use super::round::{cylinder, described};
 use crate::Result;
+use crate::base::math::Rgb;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node};
+use crate::material::bsdf::{Bsdf, Diffuse};
+use crate::material::{Material, Texture};
 use crate::scene::mesh::{Mesh, append};
 use crate::scene::{Emitter, primitives};
 use glam::{DMat4, DVec3, Vec3};
@@ -35,6 +38,7 @@ impl<'a> Builder<'a> {
         let flip = p.bool("flip_normals", false)? != inside_out;
         let face = p.bool("face_normals", false)?;
         let material = match p.children(Kind::Bsdf)?.as_slice() {
+            [] if !p.children(Kind::Emitter)?.is_empty() => self.lamp_material(),
             [] => self.default_material(),
             [bsdf] => self.material(bsdf, &name)?,
             [_, second, ..] => return Err(second.at.error(format!("{}: a shape has one bsdf", node.plugin))),
@@ -91,6 +95,15 @@ impl<'a> Builder<'a> {
     /// `to_world`, in the units that the command line asks for.
     pub(super) fn placed(&self, p: &mut Params<'a>) -> Result<DMat4> {
         Ok(DMat4::from_scale(DVec3::splat(f64::from(self.unit_scale))) * p.transform("to_world")?)
+    }
+
+    /// What a shape that emits gets without a scattering model: it reflects nothing, in Mitsuba too.
+    fn lamp_material(&mut self) -> u32 {
+        *self.lamp_material.get_or_insert_with(|| {
+            let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::ZERO) });
+            self.scene.materials.push(Material { name: "lamp".into(), bsdf, opacity: None });
+            self.scene.materials.len() as u32 - 1
+        })
     }
 
     fn area_emitter(&mut self, node: &'a Node) -> Result<u32> {
