@@ -2,9 +2,10 @@
 
 use super::measure::{PATH, expect_quarters, scene, usual_sensor};
 use glam::{DVec3, Vec3};
+use reprobe::base::progress::Silent;
 use reprobe::base::ray::Ray;
 use reprobe::scene::film::Filter;
-use reprobe::surface::{CurvatureParams, vertex_curvatures};
+use reprobe::surface::{CurvatureParams, curvature};
 use reprobe::transport::World;
 
 const SKY: &str = "<emitter type='constant'/>";
@@ -230,7 +231,7 @@ fn a_hits_triangle_and_weights_mean_its_place() {
 #[test]
 fn a_crowd_has_curvatures() {
     let g = scene(&format!("{SKY}{}", crowd(500, "sphere", false))).geometry;
-    let map = vertex_curvatures(&g, &CurvatureParams::default());
+    let map = curvature(&g, &CurvatureParams::default(), &Silent);
     let mut sum = 0.0;
     for k in map.k1.iter().chain(&map.k2) {
         sum += f64::from(k.abs());
