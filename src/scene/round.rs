@@ -210,7 +210,7 @@ impl Round {
         let (i, f, g) = match self.row(j) {
             Row::FromPole => (part, share(c, b + c), b + c),
             Row::ToPole => (part, share(c, 1.0 - b), b),
-            Row::Whole if part % 2 == 0 => (part / 2, c, b + c),
+            Row::Whole if part.is_multiple_of(2) => (part / 2, c, b + c),
             Row::Whole => (part / 2, b + c, b),
         };
         self.kind.at((f64::from(i) + f) / f64::from(around), (f64::from(j) + g) / f64::from(along))
