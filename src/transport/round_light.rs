@@ -162,8 +162,12 @@ mod tests {
                 let again = pdf(&round, p, s.point);
                 assert!((again / s.pdf - 1.0).abs() < 1e-2, "{kind:?} {scale} from {p}: {} and {again}", s.pdf);
             }
-            // Half a million scrambled Sobol points: the error is far below that of independent ones, 1 / sqrt(N) = 1.4e-3.
-            assert!((told / seen - 1.0).abs() < 4e-3, "{kind:?} {scale} from {p}: {told}, {seen} sr are seen");
+            // Two standard errors of as many independent directions as have met the shape; scrambled Sobol points do better.
+            let hits = seen / (4.0 * f64::from(PI)) * f64::from(N);
+            assert!(
+                (told / seen - 1.0).abs() < 2.0 / hits.sqrt() + 1e-3,
+                "{kind:?} {scale} from {p}: {told}, {seen} sr are seen"
+            );
             assert!(
                 kind != RoundKind::Sphere || inwards || (pdfs - 1.0).abs() < 4e-3,
                 "{kind:?} {scale}: density sums to {pdfs}"
