@@ -357,7 +357,7 @@ fn bad_xml_is_told_where_and_why() {
     for (body, expected) in [
         ("\n<shape type='teapot'/>".into(), "s.xml:2: unknown shape plugin \"teapot\""),
         (shape("\n<bsdf type='velvet'/>"), "s.xml:3: unknown bsdf plugin \"velvet\""),
-        ("\n<emitter type='sun'/>".into(), "s.xml:2: unknown emitter plugin"),
+        ("\n<emitter type='sun'/>".into(), "s.xml:2: sun: the sun and sky models are not read"),
         ("<texture type='marble'/>".into(), "unknown texture plugin"),
         ("<sensor type='fisheye'/>".into(), "unknown sensor plugin"),
         ("\n<widget type='x'/>".into(), "s.xml:2: unknown element <widget>"),
