@@ -11,7 +11,8 @@ DIR gets one NNNN.exr a frame with the layer names that `reprobe render-path` wr
     emission.*    light sources seen directly:               LE
 
 glossy + diffuse + emission is the full image within noise. The first vertex is the first one that scatters: alpha masks
-let rays through to it. Pixels are filtered with a box. Finished frames are kept, so an interrupted run goes on.
+let rays through to it. Pixels are filtered with a box whatever the scene's film asks for, as `reprobe render-path` does without
+`--rfilter scene`. Finished frames are kept, so an interrupted run goes on.
 
 Needs: pip install mitsuba numpy; for the fast variant llvm_ad_rgb also LLVM (Debian: apt-get install libllvm19; versions
 15 and 16 fail to compile Mitsuba's kernels), found by itself or named by DRJIT_LIBLLVM_PATH.

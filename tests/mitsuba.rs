@@ -59,7 +59,7 @@ fn a_room_has_mitsubas_light_in_every_layer() {
     let reference = ExrImage::read(&path).unwrap();
     let mut camera = world.scene.sensor.clone().unwrap();
     camera.size = [reference.width as u32, reference.height as u32];
-    let params = PathTraceParams { spp: SPP, path: PathParams::default() };
+    let params = PathTraceParams { spp: SPP, path: PathParams::default(), ..PathTraceParams::default() };
     let batches: Vec<LayerImages> = (0..BATCHES).map(|seed| path_trace(&world, &camera, &params, seed, 0, &Silent)).collect();
 
     type Pick = fn(&LayerImages) -> Vec<Rgb>;

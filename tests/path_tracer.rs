@@ -256,7 +256,7 @@ fn point_spot_and_sun_light_a_floor_by_their_closed_forms() {
     let (position, direction) = (Vec3::new(0.0, 2.0, 0.0), Vec3::NEG_Y);
     let white = Rgb::splat(10.0);
     let cutoff_rad = FRAC_PI_4;
-    let spot = Emitter::Spot { position, direction, intensity: white, cutoff_rad, beam_rad: 0.0 };
+    let spot = Emitter::Spot { position, direction, intensity: white, cutoff_rad, beam_rad: 0.0, pattern: None };
     let slant = Vec3::new(1.0, -1.0, 0.0).normalize();
     // At (1, 0, 0): distance √5, cosine 2/√5; the spot has fallen by its angle atan(1/2) over the cutoff.
     let falling = 10.0 * 2.0 / 5f32.powf(1.5);

@@ -357,7 +357,7 @@ fn bad_xml_is_told_where_and_why() {
     for (body, expected) in [
         ("\n<shape type='teapot'/>".into(), "s.xml:2: unknown shape plugin \"teapot\""),
         (shape("\n<bsdf type='velvet'/>"), "s.xml:3: unknown bsdf plugin \"velvet\""),
-        ("\n<emitter type='sun'/>".into(), "s.xml:2: unknown emitter plugin"),
+        ("\n<emitter type='sun'/>".into(), "s.xml:2: sun: the sun and sky models are not read"),
         ("<texture type='marble'/>".into(), "unknown texture plugin"),
         ("<sensor type='fisheye'/>".into(), "unknown sensor plugin"),
         ("\n<widget type='x'/>".into(), "s.xml:2: unknown element <widget>"),
@@ -390,7 +390,7 @@ fn bad_xml_is_told_where_and_why() {
         (shape("<bsdf type='roughplastic'>\n<string name='distribution' value='phong'/></bsdf>"), "s.xml:3: distribution"),
         ("<sensor type='perspective'>\n<float name='fov' value='180'/></sensor>".into(), "s.xml:2: fov = 180"),
         ("<emitter type='constant'/>\n<emitter type='constant'/>".into(), "s.xml:2: a second environment"),
-        ("\n<emitter type='area'/>".into(), "s.xml:2: found an area emitter by itself"),
+        ("\n<emitter type='area'/>".into(), "s.xml:2: found an area emitter that no shape holds or refers to"),
         ("<bsdf type='twosided' id='a'><ref id='a'/></bsdf>".into(), "refer to themselves"),
         (bomb, "more than 200000"),
         (deep("<bsdf type='twosided'>", "</bsdf>"), "nested more than 500 deep"),

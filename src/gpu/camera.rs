@@ -1,6 +1,8 @@
 //! The camera as kernels read it.
 
-use crate::scene::Camera;
+use crate::scene::camera::ALL_DEPTHS;
+use crate::scene::{Camera, Scene};
+use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 
 /// `Camera` of camera.wgsl.
@@ -17,6 +19,26 @@ pub(crate) struct GpuCamera {
     width: u32,
     height: u32,
     padding: [u32; 3],
+}
+
+/// An error where the GPU's cameras cannot show what these do.
+pub fn check<'a>(scene: &Scene, cameras: impl IntoIterator<Item = &'a Camera>) -> Result<()> {
+    let missing = |what: &str| Err(Error::Request(format!("the GPU's cameras have no {what}; use --device cpu")));
+    if scene.hide_emitters {
+        return missing("hidden emitters (hide_emitters)");
+    }
+    for camera in cameras {
+        if camera.orthographic.is_some() {
+            return missing("parallel rays (orthographic)");
+        }
+        if camera.shift != glam::Vec2::ZERO {
+            return missing("shifted axis (principal_point_offset_x and _y, or a crop window)");
+        }
+        if camera.clip != ALL_DEPTHS {
+            return missing("clipping planes, and near_clip or far_clip cuts something off here");
+        }
+    }
+    Ok(())
 }
 
 impl From<&Camera> for GpuCamera {

@@ -3,7 +3,7 @@
 //! A kernel's WGSL lies in `shaders/` under its twin's name and shares its structs with a `#[repr(C)]` type here. Results are the CPU's
 //! but for rounding. Kernels run in dispatches of a second at the most, so that no driver takes the device for hung.
 
-pub(crate) mod camera;
+pub mod camera;
 pub(crate) mod commands;
 mod device;
 pub(crate) mod follow;

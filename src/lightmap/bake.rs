@@ -345,7 +345,9 @@ fn solids(scene: &Scene) -> Orientation {
                     occupied.push((a + b + c) / 3.0 + n.normalize_or_zero() * (1e-3 * n.length().sqrt()));
                 }
             }
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => occupied.push(*position),
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } | Emitter::Projector { position, .. } => {
+                occupied.push(*position)
+            }
             Emitter::Envmap { .. } | Emitter::Constant { .. } | Emitter::Directional { .. } => {}
         }
     }

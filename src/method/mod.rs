@@ -13,6 +13,7 @@ use crate::base::progress::Progress;
 use crate::gpu::Gpu;
 use crate::io::ExrImage;
 use crate::lightmap::LightMap;
+use crate::scene::Scene;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::View;
@@ -43,10 +44,14 @@ pub struct Method {
     pub samples: Option<Samples>,
     /// Whether it sees a scene's transmissive shapes too.
     pub transmissive: bool,
+    /// Whether it has cameras of parallel rays.
+    pub orthographic: bool,
     /// Whether a frame may depend on the one before it, so that a path is rendered as a whole.
     pub sequential: bool,
     /// Its parameters, checked, from the options.
     pub parameters: fn(&Options) -> Result<Value>,
+    /// Fills in what the scene says of them, where the options have left it open; and warnings.
+    pub for_scene: fn(Value, &Scene) -> Result<(Value, Vec<String>)>,
     /// Makes its renderer on the CPU.
     pub cpu: Constructor,
     /// Makes its renderer on a GPU; `None` where there is none.
@@ -148,6 +153,8 @@ pub struct Options {
     pub max_depth: Option<u32>,
     /// `--layers`.
     pub layers: Option<LayerChoice>,
+    /// `--rfilter`.
+    pub rfilter: Option<FilterChoice>,
     /// `--denoise`.
     pub denoise: bool,
     /// `--paper`.
@@ -165,6 +172,21 @@ pub enum LayerChoice {
     All,
     /// The image alone, one path a sample.
     Full,
+}
+
+/// The filter of a path-traced frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FilterChoice {
+    /// The pixel's own square.
+    Box,
+    /// That of the scene's film; where it names none, Mitsuba's Gaussian of half a pixel.
+    Scene,
+}
+
+/// [`Method::for_scene`] of a method that asks nothing of the scene.
+pub fn as_given(parameters: Value, _: &Scene) -> Result<(Value, Vec<String>)> {
+    Ok((parameters, Vec::new()))
 }
 
 /// What frames are made of.

@@ -23,6 +23,29 @@ impl Listener for Silent {
     fn say(&self, _: &str) {}
 }
 
+/// Depth from which on what longer paths carry is not worth a word.
+const LONG_PATH: u32 = 64;
+/// Sizes that scenes in metres have.
+const METRES: std::ops::RangeInclusive<f32> = 0.1..=10_000.0;
+
+/// Says what of a scene does not count for bakes.
+fn warn_of_bakes(scene: &Scene, listener: &dyn Listener) {
+    if let Some(depth) = scene.max_depth.filter(|&depth| depth < LONG_PATH) {
+        let at = &scene.max_depth_at;
+        listener.warn(&format!("{at}: max_depth = {depth} counts for path-trace alone: bakes follow paths to their end"));
+    }
+    let (low, high) = scene.geometry.bounds();
+    let across = low.distance(high);
+    if across > 0.0 && across.is_finite() && !METRES.contains(&across) {
+        // The power of ten that makes it a room.
+        let scale = 10f32.powi(1 - across.log10().ceil() as i32);
+        let path = scene.path.display();
+        listener.warn(&format!(
+            "{path} is {across:.1e} across, and bakes count in metres: if that is not so, give every command --unit-scale {scale:e}"
+        ));
+    }
+}
+
 /// Options of every stage.
 #[derive(Clone)]
 pub struct Context {
@@ -82,7 +105,9 @@ impl Context {
         if let Some((_, world)) = slot.as_ref().filter(|(p, _)| p == path) {
             return Ok(world.clone());
         }
-        let (world, left_out) = World::opaque(self.load_scene(path)?);
+        let scene = self.load_scene(path)?;
+        warn_of_bakes(&scene, &*self.listener);
+        let (world, left_out) = World::opaque(scene);
         if left_out > 0 {
             let message = format!("{left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces");
             self.listener.warn(&message);

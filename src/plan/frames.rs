@@ -10,6 +10,7 @@ use crate::io::jobs::is_finished;
 use crate::io::{ExrImage, Provenance, atomic};
 use crate::method::{Frame, Method, Renderer, Setup};
 use crate::scene::Camera;
+use crate::scene::camera::ALL_DEPTHS;
 use crate::view::View;
 use crate::view::aov::with_first_hits;
 use serde_json::{Value, json};
@@ -142,10 +143,22 @@ impl Frames<'_> {
 
 /// The camera, as provenance keeps it.
 fn describe(camera: &Camera) -> Value {
-    json!({
+    let mut described = json!({
         "to_world": camera.to_world.to_cols_array(), "fov_x_rad": camera.fov_x, "size": camera.size,
         "aperture_radius": camera.aperture_radius, "focus_distance": camera.focus_distance,
-    })
+    });
+    // What few cameras have is said of those alone, so that the others' finished frames stay finished.
+    if camera.shift != glam::Vec2::ZERO {
+        described["shift"] = json!(camera.shift.to_array());
+    }
+    if camera.clip != ALL_DEPTHS {
+        // Infinity is no number of JSON's.
+        described["clip"] = json!(camera.clip.map(|depth| depth.to_string()));
+    }
+    if let Some(half) = camera.orthographic {
+        described["orthographic"] = json!(half.to_array());
+    }
+    described
 }
 
 /// Writes `timings.json` and sums up the run.

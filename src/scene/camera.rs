@@ -1,10 +1,14 @@
-//! Perspective and thin-lens cameras.
+//! Perspective, thin-lens and orthographic cameras.
 
+use super::Geometry;
 use crate::base::ray::Ray;
 use glam::{Affine3A, Vec2, Vec3};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
-/// A pinhole or thin-lens camera that looks along local +Z, with +X to the left of the image (Mitsuba's convention).
+/// No clipping.
+pub const ALL_DEPTHS: [f32; 2] = [0.0, f32::INFINITY];
+
+/// A pinhole, thin-lens or orthographic camera that looks along local +Z, with +X to the left of the image (Mitsuba's convention).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// Camera to world, rigid (a scene file may also mirror it).
@@ -17,6 +21,13 @@ pub struct Camera {
     pub aperture_radius: f32,
     /// Distance of the plane in focus.
     pub focus_distance: f32,
+    /// How far the optical axis meets the image right of and below its middle, in widths and heights of the image: lens shift, or a
+    /// window cut out of a larger film.
+    pub shift: Vec2,
+    /// Depths along local +Z between which surfaces are seen.
+    pub clip: [f32; 2],
+    /// For parallel rays: the lengths that half the image's width, in pixels, spans along X and along Y. `fov_x` means nothing then.
+    pub orthographic: Option<Vec2>,
 }
 
 /// What a field of view is measured along.
@@ -60,7 +71,19 @@ impl Camera {
         let x = up.cross(z).try_normalize().unwrap_or_else(|| crate::base::math::Frame::from_normal(z).s);
         let y = z.cross(x);
         let to_world = Affine3A { matrix3: glam::Mat3A::from_cols(x.into(), y.into(), z.into()), translation: origin.into() };
-        Self { to_world, fov_x, size, aperture_radius: 0.0, focus_distance: 1.0 }
+        Self::pinhole(to_world, fov_x, size)
+    }
+
+    /// A pinhole that sees all depths, its axis through the middle of the image.
+    pub fn pinhole(to_world: Affine3A, fov_x: f32, size: [u32; 2]) -> Self {
+        let (aperture_radius, focus_distance) = (0.0, 1.0);
+        let (shift, clip) = (Vec2::ZERO, ALL_DEPTHS);
+        Self { to_world, fov_x, size, aperture_radius, focus_distance, shift, clip, orthographic: None }
+    }
+
+    /// The pixel at which the optical axis meets the image.
+    pub fn axis_px(&self) -> Vec2 {
+        Vec2::new(self.size[0] as f32, self.size[1] as f32) * (self.shift + 0.5)
     }
 
     /// Where the camera stands.
@@ -76,21 +99,66 @@ impl Camera {
     /// Ray through `pixel` (pixels, (0, 0) the upper left corner of the image) and the point
     /// of the lens that `lens` in [0, 1)² maps to.
     pub fn ray(&self, pixel: Vec2, lens: Vec2) -> Ray {
-        let half = Vec2::new(self.size[0] as f32, self.size[1] as f32) * 0.5;
-        let d = Vec3::new(half.x - pixel.x, half.y - pixel.y, self.focal_px());
+        let to_axis = self.axis_px() - pixel;
+        if let Some(half) = self.orthographic {
+            let origin = (to_axis * half * (2.0 / self.size[0] as f32)).extend(0.0);
+            let d = self.to_world.transform_vector3(Vec3::Z).normalize();
+            return self.clipped(Ray::new(self.to_world.transform_point3(origin), d), 1.0);
+        }
+        let d = to_axis.extend(self.focal_px());
         if self.aperture_radius == 0.0 {
-            return Ray::new(self.position(), self.to_world.transform_vector3(d).normalize());
+            let ray = Ray::new(self.position(), self.to_world.transform_vector3(d).normalize());
+            return self.clipped(ray, d.length() / d.z);
         }
         let focus = d * (self.focus_distance / d.z);
         let origin = (concentric_disk(lens) * self.aperture_radius).extend(0.0);
-        Ray::new(self.to_world.transform_point3(origin), self.to_world.transform_vector3(focus - origin).normalize())
+        let d = focus - origin;
+        let ray = Ray::new(self.to_world.transform_point3(origin), self.to_world.transform_vector3(d).normalize());
+        self.clipped(ray, d.length() / d.z)
     }
 
-    /// Pixel that a pinhole at this place sees `p` at; `None` behind the camera. Inverse of [`Camera::ray`].
+    /// The ray between the clipping planes; its direction gains depth 1 over the distance `slant`.
+    fn clipped(&self, ray: Ray, slant: f32) -> Ray {
+        if self.clip == ALL_DEPTHS {
+            return ray;
+        }
+        Ray { t_min: self.clip[0] * slant, t_max: self.clip[1] * slant, ..ray }
+    }
+
+    /// Takes clipping planes away that cut nothing off: those of most files are far from everything.
+    pub fn drop_idle_clip(&mut self, geometry: &Geometry) {
+        let inverse = self.to_world.inverse();
+        let depth = |p: Vec3| inverse.transform_point3(p).z;
+        let beyond = |p: Vec3| depth(p) >= self.clip[1];
+        let round_corners = geometry.rounds.iter().flat_map(|r| {
+            let [low, high] = r.bounds().map(|p| p.as_vec3());
+            (0..8).map(move |k| Vec3::select(glam::BVec3::new(k & 1 == 1, k & 2 == 2, k & 4 == 4), low, high))
+        });
+        if self.clip[1] < f32::INFINITY && !geometry.positions.iter().copied().chain(round_corners).any(beyond) {
+            self.clip[1] = f32::INFINITY;
+        }
+        // How far from the camera something in view may be that lies before the near plane.
+        let corner = Vec2::new(self.size[0] as f32, self.size[1] as f32) * (self.shift.abs() + 0.5);
+        let reach = self.clip[0] * corner.extend(self.focal_px()).length() / self.focal_px() + self.aperture_radius;
+        let near = |t: u32| {
+            let [a, b, c] = geometry.corners(t);
+            let p = self.position();
+            p.distance(p.clamp(a.min(b).min(c), a.max(b).max(c))) <= reach
+        };
+        let all = 0..geometry.triangles.len() as u32;
+        if self.clip[0] > 0.0 && self.orthographic.is_none() && geometry.rounds.is_empty() && !all.into_iter().any(near) {
+            self.clip[0] = 0.0;
+        }
+    }
+
+    /// Pixel that this camera, its lens a pinhole, sees `p` at; `None` behind it. Inverse of [`Camera::ray`].
     pub fn project(&self, p: Vec3) -> Option<Vec2> {
         let local = self.to_world.inverse().transform_point3(p);
-        let half = Vec2::new(self.size[0] as f32, self.size[1] as f32) * 0.5;
-        (local.z > 0.0).then(|| half - Vec2::new(local.x, local.y) * (self.focal_px() / local.z))
+        let pixels = match self.orthographic {
+            Some(half) => Vec2::new(0.5 * self.size[0] as f32, 0.5 * self.size[0] as f32) / half,
+            None => Vec2::splat(self.focal_px() / local.z),
+        };
+        (local.z > 0.0).then(|| self.axis_px() - Vec2::new(local.x, local.y) * pixels)
     }
 }
 

@@ -3,8 +3,26 @@
 use crate::base::math::Rgb;
 use crate::material::Texture;
 use crate::material::image::Image;
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Vec2, Vec3};
 use std::sync::Arc;
+
+/// A texture thrown from a point.
+#[derive(Debug, Clone)]
+pub struct Pattern {
+    /// The colours.
+    pub texture: Texture,
+    /// From the world to a space in which the light starts at the origin and goes along +Z.
+    pub to_local: Affine3A,
+    /// What half the texture's width and height span at z = 1; a negative one turns the texture round.
+    pub half: Vec2,
+}
+
+impl Pattern {
+    /// Texture coordinate in the direction of a point of the pattern's own space.
+    pub fn uv(&self, local: Vec3) -> Vec2 {
+        local.truncate() / (self.half * (2.0 * local.z)) + 0.5
+    }
+}
 
 /// A light source.
 #[derive(Debug, Clone)]
@@ -49,6 +67,19 @@ pub enum Emitter {
         cutoff_rad: f32,
         /// Angle up to which it is full, radians.
         beam_rad: f32,
+        /// Colours over the cone's cross-section, and what they are placed with.
+        pattern: Option<Box<Pattern>>,
+    },
+    /// A point that throws an image, as a pinhole camera would take it.
+    Projector {
+        /// World position.
+        position: Vec3,
+        /// Unit direction to the image's middle.
+        direction: Vec3,
+        /// Irradiance, over π, of a surface at distance 1 along the axis that faces the projector.
+        image: Box<Pattern>,
+        /// Largest angle between `direction` and light, radians.
+        cutoff_rad: f32,
     },
     /// Parallel light.
     Directional {

@@ -1,5 +1,6 @@
 //! Triangles of all shapes in one set of arrays.
 
+use super::Round;
 use glam::{Vec2, Vec3};
 
 /// World-space triangles of all objects. Vertices are not shared between objects.
@@ -17,6 +18,8 @@ pub struct Geometry {
     pub triangle_object: Vec<u32>,
     /// The objects, one a shape, in file order.
     pub objects: Vec<Object>,
+    /// Round shapes that rays meet as such, not as their meshes; ascending by triangles.
+    pub rounds: Vec<Round>,
 }
 
 /// One shape of the scene file.
@@ -47,6 +50,14 @@ impl Geometry {
     /// The object of a triangle.
     pub fn object(&self, triangle: u32) -> &Object {
         &self.objects[self.triangle_object[triangle as usize] as usize]
+    }
+
+    /// The round shape that a triangle belongs to, as an index into [`Geometry::rounds`].
+    pub fn round(&self, triangle: u32) -> Option<u32> {
+        let after = self.rounds.partition_point(|r| r.first <= triangle);
+        let index = after.checked_sub(1)?;
+        let object = &self.objects[self.rounds[index].object as usize];
+        object.triangles.contains(&triangle).then_some(index as u32)
     }
 
     /// Geometric normal times twice the area. `flipNormals` is already in the winding.

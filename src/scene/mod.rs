@@ -3,10 +3,12 @@
 pub mod camera;
 pub mod camera_path;
 pub mod emitter;
+pub mod film;
 pub mod geometry;
 pub mod mesh;
 pub mod normals;
 pub mod primitives;
+pub mod round;
 
 use crate::material::Material;
 use std::path::PathBuf;
@@ -14,6 +16,7 @@ use std::path::PathBuf;
 pub use camera::Camera;
 pub use emitter::Emitter;
 pub use geometry::{Geometry, Object};
+pub use round::Round;
 
 /// A loaded scene. Everything is in world space and scene units times `--unit-scale`.
 #[derive(Debug, Default)]
@@ -26,8 +29,16 @@ pub struct Scene {
     pub emitters: Vec<Emitter>,
     /// The scene file's own sensor.
     pub sensor: Option<Camera>,
+    /// The filter of the sensor's film.
+    pub film_filter: film::FilmFilter,
     /// The integrator's `max_depth`, in Mitsuba's counting (1: emission only); `None` is unbounded.
     pub max_depth: Option<u32>,
+    /// Where the scene says so, as file:line.
+    pub max_depth_at: String,
+    /// The integrator's `rr_depth`, after which Russian roulette starts; `None` where the scene gives none.
+    pub rr_depth: Option<u32>,
+    /// The integrator's `hide_emitters`: cameras see past area lights, and no environment.
+    pub hide_emitters: bool,
     /// blake3 of the tree and of every file that it names, in hex: what provenance compares.
     pub hash: String,
     /// The file that was loaded.

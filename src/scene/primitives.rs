@@ -11,11 +11,11 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
 /// Segments round a disk, and rings from its centre to its rim.
-const DISK: (u32, u32) = (96, 6);
+pub const DISK: (u32, u32) = (96, 6);
 /// Meridians of a sphere, and steps from pole to pole.
-const SPHERE: (u32, u32) = (128, 64);
+pub const SPHERE: (u32, u32) = (128, 64);
 /// Segments round a cylinder.
-const CYLINDER: u32 = 128;
+pub const CYLINDER: u32 = 128;
 
 /// The square [-1, 1]² in the plane z = 0, facing +Z; uv from (0, 0) to (1, 1).
 pub fn rectangle() -> Mesh {
@@ -119,7 +119,7 @@ pub fn cylinder(p0: Vec3, p1: Vec3, radius: f32) -> Mesh {
 
 /// A (segments + 1) x (rings + 1) grid of vertices, its first and last column on the same line. Triangles without area,
 /// at poles, are left out. Faces +n where d/dring x d/dsegment does.
-fn grid(segments: u32, rings: u32, vertex: impl Fn(u32, u32) -> (Vec3, Vec3, Vec2)) -> Mesh {
+pub(super) fn grid(segments: u32, rings: u32, vertex: impl Fn(u32, u32) -> (Vec3, Vec3, Vec2)) -> Mesh {
     let mut mesh = Mesh::default();
     for j in 0..=rings {
         for i in 0..=segments {
@@ -132,7 +132,7 @@ fn grid(segments: u32, rings: u32, vertex: impl Fn(u32, u32) -> (Vec3, Vec3, Vec
         }
     }
     let at = |i: u32, j: u32| j * (segments + 1) + i;
-    let same = |i: u32, j: u32| mesh.positions[at(i, j) as usize].distance(mesh.positions[at(i + 1, j) as usize]) < 1e-6;
+    let same = |i: u32, j: u32| mesh.positions[at(i, j) as usize] == mesh.positions[at(i + 1, j) as usize];
     for j in 0..rings {
         for i in 0..segments {
             if !same(i, j + 1) {
@@ -147,7 +147,7 @@ fn grid(segments: u32, rings: u32, vertex: impl Fn(u32, u32) -> (Vec3, Vec3, Vec
 }
 
 /// Reverses the winding.
-fn turn(mesh: &mut Mesh) {
+pub(super) fn turn(mesh: &mut Mesh) {
     mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
 }
 

@@ -4,13 +4,16 @@ use crate::base::math::Frame;
 use crate::base::ray::Hit;
 use crate::material::Surface;
 use crate::material::surface::ray_offset;
-use crate::scene::Geometry;
 use crate::scene::normals::unit_normal;
+use crate::scene::{Geometry, Round};
 use glam::{Vec2, Vec3};
 use std::num::NonZeroU32;
 
 /// Texture coordinate of a hit; the barycentrics where the object has none.
 pub fn uv_at(geometry: &Geometry, hit: &Hit) -> Vec2 {
+    if let Some(round) = geometry.round(hit.triangle) {
+        return geometry.rounds[round as usize].uv(hit.triangle, hit.u, hit.v);
+    }
     if !geometry.object(hit.triangle).has_uvs {
         return Vec2::new(hit.u, hit.v);
     }
@@ -33,6 +36,8 @@ pub struct Facet {
     pub(crate) emitter: Option<NonZeroU32>,
     /// Largest coordinate of the corners; negative where the object has no texture coordinates.
     pub(crate) extent: f32,
+    /// One more than the index of the round shape that the triangle stands for.
+    round: Option<NonZeroU32>,
 }
 
 impl Facet {
@@ -53,7 +58,13 @@ impl Facet {
             material: object.material,
             emitter: object.emitter.and_then(|e| NonZeroU32::new(e + 1)),
             extent: if object.has_uvs { extent } else { -extent },
+            round: geometry.round(triangle).and_then(|r| NonZeroU32::new(r + 1)),
         }
+    }
+
+    /// The round shape that the triangle stands for.
+    pub fn round<'a>(&self, geometry: &'a Geometry) -> Option<&'a Round> {
+        self.round.map(|r| &geometry.rounds[r.get() as usize - 1])
     }
 
     /// The surface that `hit`, of this triangle, lies on.
@@ -78,6 +89,29 @@ impl Facet {
             ng: self.ng,
             frame: Frame::from_normal_and_tangent(n, dp_du),
             uv: if has_uvs { ta * w + tb * hit.u + tc * hit.v } else { Vec2::new(hit.u, hit.v) },
+            dp_du,
+            dp_dv,
+            t: hit.t,
+            triangle: hit.triangle,
+            barycentric: Vec2::new(hit.u, hit.v),
+            object: self.object,
+            material: self.material,
+            emitter: self.emitter.map(|e| e.get() - 1),
+            offset: ray_offset(p, self.extent.abs()),
+        }
+    }
+
+    /// The place on `round`, which the triangle stands for, that `hit` means.
+    pub fn surface_of(&self, round: &Round, hit: &Hit) -> Surface {
+        let at = round.point(hit.triangle, hit.u, hit.v);
+        let p = round.to_world.transform_point3(at.p).as_vec3();
+        let n = round.normal(at.n).as_vec3();
+        let [dp_du, dp_dv] = [at.dp_du, at.dp_dv].map(|d| round.to_world.transform_vector3(d).as_vec3());
+        Surface {
+            p,
+            ng: n,
+            frame: Frame::from_normal_and_tangent(n, dp_du),
+            uv: at.uv.as_vec2(),
             dp_du,
             dp_dv,
             t: hit.t,

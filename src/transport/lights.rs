@@ -7,6 +7,7 @@
 
 use super::envmap::Envmap;
 use super::light_tree::{LightBounds, LightTree, Receiver};
+use super::round_light;
 use crate::base::math::{Rgb, luminance};
 use crate::material::{Surface, Texture};
 use crate::scene::normals::unit_normal;
@@ -31,6 +32,8 @@ pub struct Lights {
 #[derive(Debug)]
 pub(crate) enum Near {
     Triangle(LightTriangle),
+    /// Index into `Geometry::rounds`.
+    Round(u32),
     /// Point or spot: index into `Scene::emitters`.
     Delta(u32),
 }
@@ -83,6 +86,11 @@ impl Lights {
                     let mean = luminance(radiance.mean());
                     if mean > 0.0 && mean.is_finite() {
                         this.first[i] = Some(this.near.len() as u32);
+                        if let Some(round) = scene.geometry.round(object.triangles.start) {
+                            bounds.push(round_light::bounds(&scene.geometry.rounds[round as usize], mean));
+                            this.near.push(Near::Round(round));
+                            continue;
+                        }
                         for t in object.triangles.clone() {
                             let triangle = LightTriangle::new(&scene.geometry, t, i as u32);
                             bounds.push(triangle.bounds(&scene.geometry, object, mean));
@@ -100,8 +108,13 @@ impl Lights {
                     bounds.push(delta_bounds(*position, *intensity, Vec3::Z, PI, PI));
                     this.near.push(Near::Delta(i as u32));
                 }
-                Emitter::Spot { position, direction, intensity, cutoff_rad, .. } => {
-                    bounds.push(delta_bounds(*position, *intensity, *direction, 0.0, *cutoff_rad));
+                Emitter::Spot { position, direction, intensity, cutoff_rad, pattern, .. } => {
+                    let mean = pattern.as_ref().map_or(Rgb::ONE, |p| p.texture.mean());
+                    bounds.push(delta_bounds(*position, *intensity * mean, *direction, 0.0, *cutoff_rad));
+                    this.near.push(Near::Delta(i as u32));
+                }
+                Emitter::Projector { position, direction, image, cutoff_rad } => {
+                    bounds.push(delta_bounds(*position, image.texture.mean() * PI, *direction, 0.0, *cutoff_rad));
                     this.near.push(Near::Delta(i as u32));
                 }
             }
@@ -142,6 +155,12 @@ impl Lights {
         let probability = probability / shares as f32;
         match &self.near[index as usize] {
             Near::Triangle(triangle) => triangle.sample(scene, receiver.p, probability, v),
+            Near::Round(round) => {
+                let round = &scene.geometry.rounds[*round as usize];
+                let emitter = scene.geometry.objects[round.object as usize].emitter?;
+                let Emitter::Area { radiance, .. } = &scene.emitters[emitter as usize] else { return None };
+                round_light::sample(round, radiance, receiver.p, probability, v)
+            }
             Near::Delta(emitter) => {
                 let mut sample = sample_delta(&scene.emitters[*emitter as usize], receiver.p)?;
                 sample.weight /= probability;
@@ -163,6 +182,10 @@ impl Lights {
     /// Density with which [`Lights::sample`] finds the emitting point `s`.
     pub fn pdf_surface(&self, scene: &Scene, receiver: &Receiver, s: &Surface) -> f32 {
         let Some(first) = s.emitter.and_then(|e| self.first.get(e as usize).copied().flatten()) else { return 0.0 };
+        if let Some(Near::Round(round)) = self.near.get(first as usize) {
+            let round = &scene.geometry.rounds[*round as usize];
+            return self.share() * self.tree.probability(receiver, first) * round_light::pdf(round, receiver.p, s.p);
+        }
         let index = first + (s.triangle - scene.geometry.objects[s.object as usize].triangles.start);
         let Some(Near::Triangle(triangle)) = self.near.get(index as usize) else { return 0.0 };
         let to_light = s.p - receiver.p;
@@ -293,27 +316,39 @@ impl Environment {
 
 /// Irradiance that a delta emitter sends to a surface at `p` that faces it, as the `weight` of a sample.
 fn sample_delta(emitter: &Emitter, p: Vec3) -> Option<LightSample> {
-    let (point, intensity, cone) = match *emitter {
+    let (point, intensity, falloff) = match emitter {
         Emitter::Directional { direction, irradiance } => {
             let sample = LightSample {
-                wi: -direction,
+                wi: -*direction,
                 distance: f32::INFINITY,
                 point: Vec3::ZERO,
-                weight: irradiance,
+                weight: *irradiance,
                 pdf: 1.0,
                 delta: true,
             };
             return Some(sample);
         }
-        Emitter::Point { position, intensity } => (position, intensity, None),
-        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad } => {
-            (position, intensity, Some((direction, cutoff_rad, beam_rad)))
+        Emitter::Point { position, intensity } => (*position, *intensity, 1.0),
+        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad, pattern } => {
+            let cos = direction.dot((p - *position).try_normalize()?);
+            let colour = pattern.as_ref().map_or(Rgb::ONE, |t| t.texture.eval(t.uv(t.to_local.transform_point3(p))));
+            (*position, *intensity * colour, spot_falloff(cos, *cutoff_rad, *beam_rad))
+        }
+        Emitter::Projector { position, direction, image, .. } => {
+            let local = image.to_local.transform_point3(p);
+            let uv = image.uv(local);
+            if local.z <= 0.0 || !(uv.cmpge(Vec2::ZERO) & uv.cmple(Vec2::ONE)).all() {
+                return None;
+            }
+            // As Mitsuba: irradiance falls with the squared depth; a surface that faces the axis gets what the image says.
+            let to_point = p - *position;
+            let scale = PI * to_point.length().powi(3) / (local.z * local.z * direction.dot(to_point));
+            (*position, image.texture.eval(uv), scale)
         }
         Emitter::Area { .. } | Emitter::Envmap { .. } | Emitter::Constant { .. } => return None,
     };
     let distance = point.distance(p);
     let wi = (point - p).try_normalize()?;
-    let falloff = cone.map_or(1.0, |(axis, cutoff, beam)| spot_falloff(axis.dot(-wi), cutoff, beam));
     let weight = intensity * (falloff / (distance * distance));
     (falloff > 0.0).then_some(LightSample { wi, distance, point, weight, pdf: 1.0, delta: true })
 }
@@ -347,6 +382,7 @@ mod tests {
     fn lamp(y: f32, others: Vec<Emitter>) -> Scene {
         let corner = |x: f32, z: f32| Vec3::new(x, y, z);
         let geometry = Geometry {
+            rounds: Vec::new(),
             positions: vec![corner(-1.0, -2.0), corner(1.0, -2.0), corner(1.0, 2.0), corner(-1.0, 2.0)],
             normals: vec![Vec3::NEG_Y; 4],
             uvs: vec![Vec2::ZERO; 4],
@@ -371,6 +407,7 @@ mod tests {
     fn spot_point_and_directional_are_those_of_mitsuba() {
         // Mitsuba 3.9.1: cutoff 40, beam 25 degrees, from (0, 3, 0) to (1, 0, 0.5).
         let spot = Emitter::Spot {
+            pattern: None,
             position: Vec3::new(0.0, 3.0, 0.0),
             direction: Vec3::new(1.0, -3.0, 0.5).normalize(),
             intensity: Rgb::new(5.0, 4.0, 3.0),

@@ -7,6 +7,7 @@ pub mod follow;
 pub mod light_tree;
 pub mod lights;
 pub mod path;
+mod round_light;
 pub mod sampler;
 mod steps;
 pub mod world;

@@ -12,6 +12,7 @@ use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::material::Surface;
 use crate::material::bsdf::{Bsdf, BsdfSample, Lobes, Query};
+use crate::scene::Scene;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -41,6 +42,16 @@ impl Default for PathParams {
     }
 }
 
+impl PathParams {
+    /// What the scene's integrator says, with the defaults for what it does not.
+    pub fn of(scene: &Scene) -> Self {
+        let default = Self::default();
+        // Mitsuba counts the last vertex too, which only emits.
+        let max_depth = scene.max_depth.map_or(default.max_depth, |depth| depth.saturating_sub(1));
+        Self { max_depth, rr_depth: scene.rr_depth.unwrap_or(default.rr_depth) }
+    }
+}
+
 /// The three layers of a pixel; their sum is the full image.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Layers {
@@ -66,8 +77,8 @@ pub type KnownDiffuse<'a> = &'a (dyn Fn(&Surface, Vec3) -> Rgb + Sync);
 
 /// One sample of the three layers along a camera ray.
 pub fn trace_layers(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Layers {
-    let Some(surface) = world.intersect(ray) else {
-        return Layers { emission: keep_finite(world.lights.environment(ray.d)), ..Layers::default() };
+    let Some(surface) = world.seen(ray) else {
+        return Layers { emission: keep_finite(world.backdrop(ray.d)), ..Layers::default() };
     };
     let wo = -ray.d;
     let present = world.scene.materials[surface.material as usize].bsdf.lobes();
@@ -115,8 +126,12 @@ pub fn transmitted_irradiance(
     integrate(&Vertex { world, surface, measure }, known, params, sampler)
 }
 
-/// Radiance arriving from the far end of `ray`, emission included, without a split.
+/// Radiance that a camera sees along `ray`, emission included (unless the scene hides its emitters), without a split.
 pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+    if world.scene.hide_emitters {
+        let of = |surface: Surface| scattered(world, &surface, -ray.d, Query::default(), None, params, sampler);
+        return world.seen(ray).map_or(Rgb::ZERO, of);
+    }
     let from = Receiver { p: ray.o, n: Vec3::ZERO };
     let start = Start { ray: *ray, from, pdf: 1.0, delta: true, eta: 1.0, depth: 0 };
     keep_finite(incident(world, start, None, params, sampler))

@@ -3,9 +3,11 @@
 use super::bvh::Bvh;
 use super::facet::Facet;
 use super::lights::Lights;
+use crate::base::math::Rgb;
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
 use crate::scene::Scene;
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Scene, BVH and emitter distributions: what every ray-tracing stage takes.
@@ -50,9 +52,34 @@ impl World {
         self.closest(ray).map(|hit| self.surface(&hit))
     }
 
+    /// The surface that a camera's ray shows: where the scene hides its emitters, the first that is none.
+    pub fn seen(&self, ray: &Ray) -> Option<Surface> {
+        let mut surface = self.intersect(ray)?;
+        if !self.scene.hide_emitters {
+            return Some(surface);
+        }
+        let mut way = 0.0;
+        while surface.emitter.is_some() {
+            way += surface.t;
+            let next = Ray { t_max: ray.t_max - way, ..surface.spawn(ray.d) };
+            surface = self.intersect(&next)?;
+        }
+        surface.t += way;
+        Some(surface)
+    }
+
+    /// Radiance of the environment as a camera's ray in direction `d` shows it.
+    pub fn backdrop(&self, d: Vec3) -> Rgb {
+        if self.scene.hide_emitters { Rgb::ZERO } else { self.lights.environment(d) }
+    }
+
     /// The surface that a hit lies on.
     pub fn surface(&self, hit: &Hit) -> Surface {
-        self.facets[hit.triangle as usize].surface(hit)
+        let facet = &self.facets[hit.triangle as usize];
+        match facet.round(&self.scene.geometry) {
+            None => facet.surface(hit),
+            Some(round) => facet.surface_of(round, hit),
+        }
     }
 
     /// Whether something blocks a ray.

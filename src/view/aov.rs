@@ -41,7 +41,7 @@ pub fn with_first_hits(image: ExrImage, world: &World, camera: &Camera) -> ExrIm
 
 fn first_hit(world: &World, camera: &Camera, pixel: Vec2) -> FirstHit {
     let ray = camera.ray(pixel, Vec2::splat(0.5));
-    let Some(s) = world.intersect(&ray) else {
+    let Some(s) = world.seen(&ray) else {
         let nothing = Vec3::ZERO;
         return FirstHit { depth: 0.0, normal: nothing, position: nothing, material: NO_MATERIAL, albedo: nothing, alpha: -1.0 };
     };

@@ -56,9 +56,9 @@ pub fn gbuffer(world: &World, curvature: &CurvatureMap, camera: &Camera) -> GBuf
         .map(|i| {
             let centre = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
             let ray = camera.ray(centre, Vec2::splat(0.5));
-            match world.intersect(&ray) {
+            match world.seen(&ray) {
                 Some(surface) => (Some(pixel(world, curvature, surface, -ray.d)), Rgb::ZERO),
-                None => (None, world.lights.environment(ray.d)),
+                None => (None, world.backdrop(ray.d)),
             }
         })
         .unzip();

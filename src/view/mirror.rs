@@ -82,9 +82,7 @@ pub fn mirror_hit(world: &World, surface: &Surface, wo: Vec3) -> Reflected {
     match world.closest(&surface.spawn(d)) {
         Some(hit) => {
             let geometry = &world.scene.geometry;
-            let [a, b, c] = geometry.corners(hit.triangle);
-            let point = a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v;
-            Reflected { point, material: geometry.object(hit.triangle).material as u16 }
+            Reflected { point: world.surface(&hit).p, material: geometry.object(hit.triangle).material as u16 }
         }
         None => Reflected { point: d, material: SKY },
     }

@@ -2,7 +2,7 @@
 
 use crate::common::parse_bytes;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use reprobe::method::{LayerChoice, METHODS};
+use reprobe::method::{FilterChoice, LayerChoice, METHODS};
 use reprobe::plan::option::Size;
 use reprobe::plan::stages::{Aov, RenderPath};
 use reprobe::plan::views::FrameList;
@@ -50,10 +50,13 @@ pub struct Args {
     spp: Option<u32>,
     #[arg(long, value_name = "N", help = used_by("samples", "taps a pixel, or glossy rays at the first vertex [default: 64, 4]"))]
     samples: Option<u32>,
-    #[arg(long, value_name = "N", help = used_by("max-depth", "most scattering vertices of a path [default: unbounded; lightmap-rt: 3]"))]
+    #[arg(long, value_name = "N", help = used_by("max-depth", "most scattering vertices of a path [default: the scene's max_depth less one; lightmap-rt: 3]"))]
     max_depth: Option<u32>,
     #[arg(long, value_name = "LAYERS", help = used_by("layers", "all: the image and its layers; full: the image alone, one path a sample [default: all]"))]
     layers: Option<LayerChoice>,
+    #[arg(long, value_name = "FILTER", help = used_by("rfilter", "box, or scene: the filter of the scene's film, for the image that Mitsuba \
+        would make of it; frames of other methods and references are box-filtered, and only like can be compared with like [default: box]"))]
+    rfilter: Option<FilterChoice>,
     #[arg(long, help = used_by("denoise", "filter the layers, guided by albedo, normal and depth"))]
     denoise: bool,
     #[arg(long, value_name = "MS", conflicts_with_all = ["spp", "samples"],
@@ -100,6 +103,7 @@ impl Args {
             samples: self.samples,
             max_depth: self.max_depth,
             layers: self.layers,
+            rfilter: self.rfilter,
             denoise: self.denoise,
             budget_ms: self.budget_ms,
             match_time: self.match_time,

@@ -1,6 +1,6 @@
 //! The steps of a `transform`, composed as Mitsuba does: each acts after those before it.
 
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DMat3, DMat4, DVec3, DVec4};
 
 /// No coordinate of a sane scene is larger, and products of a few stay finite in single precision.
 const LARGEST: f64 = 1e15;
@@ -27,15 +27,20 @@ impl Steps {
     }
 
     /// Turns about an axis through the origin, counter-clockwise as the axis points at the viewer.
+    ///
+    /// As Mitsuba 3 (and not 0.6), the axis is taken as it is: one that is not of unit length scales too.
     pub fn rotate(&mut self, axis: DVec3, degrees: f64) -> Result<(), String> {
-        let axis = axis.try_normalize().ok_or("rotate: the axis has no length")?;
-        self.then(DMat4::from_axis_angle(axis, degrees.to_radians()))
+        axis.try_normalize().ok_or("rotate: the axis has no length")?;
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let column = |unit: DVec3| axis * (axis.dot(unit) * (1.0 - cos)) + unit * cos + axis.cross(unit) * sin;
+        self.then(DMat4::from_mat3(DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z))))
     }
 
-    /// Puts +Z towards `target` from `origin`, +Y near `up`.
+    /// Puts +Z towards `target` from `origin`, +Y near `up`. Without it, or where it is zero, as Mitsuba completes a basis (Duff et
+    /// al. 2017).
     pub fn look_at(&mut self, origin: DVec3, target: DVec3, up: Option<DVec3>) -> Result<(), String> {
         let z = (target - origin).try_normalize().ok_or("lookat: origin and target are the same point")?;
-        let up = up.unwrap_or_else(|| z.any_orthonormal_vector());
+        let up = up.filter(|up| *up != DVec3::ZERO).unwrap_or_else(|| z.any_orthonormal_pair().0);
         let x = up.cross(z).try_normalize().ok_or("lookat: up is parallel to the view, or zero")?;
         self.then(DMat4::from_cols(x.extend(0.0), z.cross(x).extend(0.0), z.extend(0.0), origin.extend(1.0)))
     }
@@ -44,7 +49,7 @@ impl Steps {
     pub fn matrix(&mut self, rows: &[f64]) -> Result<(), String> {
         let m = match rows.len() {
             16 => DMat4::from_cols_slice(rows).transpose(),
-            9 => DMat4::from_mat3(glam::DMat3::from_cols_slice(rows).transpose()),
+            9 => DMat4::from_mat3(DMat3::from_cols_slice(rows).transpose()),
             n => return Err(format!("matrix: {n} numbers, expected 16 or 9")),
         };
         if m.row(3) != DVec4::W {
@@ -90,6 +95,40 @@ mod tests {
         let m = steps.finish().unwrap();
         assert!((m.transform_vector3(DVec3::Z) + DVec3::Z).length() < 1e-12);
         assert!((m.transform_vector3(DVec3::X) + DVec3::X).length() < 1e-12);
+    }
+
+    /// Mitsuba 3.9.1's `to_world` of `<lookat origin="1,2,3" target="..."/>`: its columns x and y.
+    #[test]
+    fn look_at_without_up_is_completed_as_mitsuba_does() {
+        for (target, x, y) in [
+            ([-1.0, 0.5, 0.0], [-0.11125, 0.91656, -0.38411], [0.85166, -0.11125, -0.51215]),
+            ([1.0, 2.0, 8.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]),
+            ([1.0, 5.0, 3.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]),
+        ] {
+            for up in [None, Some(DVec3::ZERO)] {
+                let mut steps = Steps::default();
+                steps.look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::from(target), up).unwrap();
+                let m = steps.finish().unwrap();
+                for (k, column) in [x, y].into_iter().enumerate() {
+                    assert!((m.col(k).truncate() - DVec3::from(column)).length() < 2e-5, "{target:?}: {m}");
+                }
+            }
+        }
+    }
+
+    /// Mitsuba 3.9.1's `rotate` about (1, 1, 0) by 90 degrees and about (0, 2, 0) by 30: rows.
+    #[test]
+    fn rotation_axes_count_as_they_are() {
+        for (axis, degrees, rows) in [
+            ([1.0, 1.0, 0.0], 90.0, [[1.0, 1.0, 1.0], [1.0, 1.0, -1.0], [-1.0, 1.0, 0.0]]),
+            ([0.0, 2.0, 0.0], 30.0, [[0.866_025, 0.0, 1.0], [0.0, 1.401_924, 0.0], [-1.0, 0.0, 0.866_025]]),
+        ] {
+            let mut steps = Steps::default();
+            steps.rotate(DVec3::from(axis), degrees).unwrap();
+            let m = DMat3::from_mat4(steps.finish().unwrap());
+            let expected = DMat3::from_cols_array_2d(&rows).transpose();
+            assert!(m.abs_diff_eq(expected, 1e-5), "{axis:?}: {m}");
+        }
     }
 
     #[test]

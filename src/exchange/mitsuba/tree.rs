@@ -82,8 +82,9 @@ impl Kind {
             "diffuse" | "plastic" | "roughplastic" | "conductor" | "roughconductor" | "dielectric" | "thindielectric"
             | "roughdielectric" | "twosided" | "mask" | "bumpmap" | "normalmap" | "blendbsdf" | "principled" => Self::Bsdf,
             "bitmap" | "checkerboard" => Self::Texture,
-            "area" | "envmap" | "constant" | "point" | "spot" | "directional" => Self::Emitter,
-            "perspective" | "thinlens" => Self::Sensor,
+            "area" | "envmap" | "constant" | "point" | "spot" | "directional" | "projector" | "sky" | "sun" | "sunsky"
+            | "timed_sunsky" => Self::Emitter,
+            "perspective" | "thinlens" | "orthographic" => Self::Sensor,
             "hdrfilm" | "ldrfilm" | "mfilm" | "specfilm" => Self::Film,
             "path" | "direct" | "volpath" | "volpathmis" | "bdpt" | "aov" | "depth" | "ptracer" | "moment" => Self::Integrator,
             "independent" | "stratified" | "multijitter" | "orthogonal" | "ldsampler" | "sobol" | "halton" | "box" | "tent"

@@ -67,7 +67,7 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
         Emitter::Point { position, intensity } => {
             GpuEmitter { kind: POINT, position: position.to_array(), color: intensity.to_array(), ..GpuEmitter::default() }
         }
-        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad } => GpuEmitter {
+        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad, .. } => GpuEmitter {
             kind: SPOT,
             position: position.to_array(),
             direction: direction.to_array(),
@@ -82,6 +82,8 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
             color: irradiance.to_array(),
             ..GpuEmitter::default()
         },
+        // Refused before it comes here.
+        Emitter::Projector { .. } => GpuEmitter::default(),
         Emitter::Envmap { .. } | Emitter::Constant { .. } => GpuEmitter { kind: AT_INFINITY, ..GpuEmitter::default() },
     };
     world.scene.emitters.iter().enumerate().map(of).collect()
@@ -90,6 +92,8 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
 pub(crate) fn near(world: &World) -> Vec<GpuNear> {
     let of = |near: &Near| match near {
         Near::Triangle(t) => GpuNear { triangle: t.index, emitter: t.emitter, area: t.area, padding: 0 },
+        // Refused before it comes here.
+        Near::Round(_) => GpuNear { triangle: NONE, emitter: NONE, ..GpuNear::default() },
         Near::Delta(emitter) => GpuNear { triangle: NONE, emitter: *emitter, ..GpuNear::default() },
     };
     world.lights.near.iter().map(of).collect()

@@ -7,6 +7,7 @@ mod textures;
 use super::Gpu;
 use crate::lightmap::LightMap;
 use crate::material::bsdf::{Distribution, albedo};
+use crate::scene::Emitter;
 use crate::transport::World;
 use crate::transport::facet::Facet;
 use crate::{Error, Result};
@@ -115,6 +116,17 @@ impl GpuScene {
                 "material \"{}\": the GPU has no bump or normal map within another; use --device cpu",
                 material.name
             )));
+        }
+        if !world.scene.geometry.rounds.is_empty() {
+            return Err(Error::Request(format!(
+                "{} spheres, cylinders and disks are too many for fine meshes, and the GPU has no round shapes; use --device cpu",
+                world.scene.geometry.rounds.len()
+            )));
+        }
+        let is_pattern = |e: &Emitter| matches!(e, Emitter::Projector { .. } | Emitter::Spot { pattern: Some(_), .. });
+        if world.scene.emitters.iter().any(is_pattern) {
+            let message = "the GPU has no projector and no spot with a texture; use --device cpu";
+            return Err(Error::Request(message.into()));
         }
         let (nodes, corners) = tree(world)?;
         let facets: Vec<[u32; 28]> = world.facets.iter().map(words).collect();

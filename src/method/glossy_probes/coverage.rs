@@ -158,8 +158,8 @@ impl Lit<'_> {
     /// What a ray through `at` (sub-pixels) shows.
     fn along(&self, ray: &Ray, sub: &SubPixels, window: &[usize], at: Vec2) -> Covered {
         let Self { world, lightmap, mirrors } = *self;
-        let Some(surface) = world.intersect(ray) else {
-            return Covered { emission: world.lights.environment(ray.d), ..Covered::default() };
+        let Some(surface) = world.seen(ray) else {
+            return Covered { emission: world.backdrop(ray.d), ..Covered::default() };
         };
         let wo = -ray.d;
         let emission = world.lights.emitted(&world.scene, &surface, wo);

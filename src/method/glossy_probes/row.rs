@@ -9,7 +9,7 @@ use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::gpu::Gpu;
 use crate::io::ExrImage;
-use crate::method::{Frame, Method, Need, Options, Picture, Probes, Reads, Renderer, Setup};
+use crate::method::{Frame, Method, Need, Options, Picture, Probes, Reads, Renderer, Setup, as_given};
 use crate::probe::store::ProbeStore;
 use crate::scene::Camera;
 use crate::surface::CurvatureMap;
@@ -36,8 +36,10 @@ pub const METHOD: Method = Method {
     options: &["probes", "lightmap", "curvature", "supersample", "gpu-memory", "paper", "set"],
     samples: None,
     transmissive: false,
+    orthographic: false,
     sequential: true,
     parameters,
+    for_scene: as_given,
     cpu,
     gpu: Some(gpu),
 };

@@ -14,6 +14,7 @@ use crate::probe::file::Probe;
 use crate::probe::parameter_map::ParameterMap;
 use crate::probe::placement::ProbeGrid;
 use crate::scene::Camera;
+use crate::scene::camera::ALL_DEPTHS;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::gbuffer::gbuffer;
@@ -60,6 +61,9 @@ impl Served {
             let mut hash = blake3::Hasher::new();
             hash.update(bytemuck::cast_slice(&c.to_world.to_cols_array()));
             hash.update(&c.fov_x.to_le_bytes());
+            if c.shift != glam::Vec2::ZERO || c.clip != ALL_DEPTHS {
+                hash.update(bytemuck::cast_slice(&c.shift.to_array())).update(bytemuck::cast_slice(&c.clip));
+            }
             hash.update(bytemuck::cast_slice(&c.size));
             hash.finalize().to_hex().to_string()
         };

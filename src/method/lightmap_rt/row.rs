@@ -8,7 +8,7 @@ use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::gpu::Gpu;
 use crate::lightmap::LightMap;
-use crate::method::{Frame, Method, Need, Options, Reads, Renderer, Samples, Setup};
+use crate::method::{Frame, Method, Need, Options, Reads, Renderer, Samples, Setup, as_given};
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
@@ -24,8 +24,10 @@ pub const METHOD: Method = Method {
     options: &["lightmap", "supersample", "samples", "max-depth", "budget-ms", "match-time", "set"],
     samples: Some(Samples { option: "samples", pointer: "/samples" }),
     transmissive: false,
+    orthographic: false,
     sequential: false,
     parameters,
+    for_scene: as_given,
     cpu,
     gpu: Some(gpu),
 };

@@ -122,7 +122,7 @@ pub fn guides(world: &World, camera: &Camera, params: &DenoiseParams, spp: u32, 
             let [dx, dy, lens_x, lens_y] = Sampler::new(hash_words(&[seed, frame, i]), index).next_4d();
             let ray = camera.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y));
             let far = Guide { depth: FAR, ..Guide::default() };
-            let both = world.intersect(&ray).map_or([far; 2], |s| surface_guides(world, &s, -ray.d, params));
+            let both = world.seen(&ray).map_or([far; 2], |s| surface_guides(world, &s, -ray.d, params));
             sums = [sums[0].plus(both[0]), sums[1].plus(both[1])];
         }
         sums.map(|g| g.scaled(1.0 / samples as f32))

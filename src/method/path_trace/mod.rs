@@ -1,6 +1,7 @@
 //! Path-traced frames: emission, diffuse and glossy layers in one pass, or the full image by one path a sample.
 //!
-//! A box filter: each pixel is the mean of samples spread over its own square (Owen-scrambled Sobol).
+//! With a box filter, each pixel is the mean of samples spread over its own square (Owen-scrambled Sobol); with another
+//! ([`crate::scene::film`]), over all that the filter reaches.
 //! In: world, camera. Out: linear radiance a layer; their sum is the full image.
 
 pub mod denoise;
@@ -14,6 +15,7 @@ use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;
 use crate::base::ray::Ray;
 use crate::scene::Camera;
+use crate::scene::film::{Filter, FilterSamples};
 use crate::transport::path::{Layers, PathParams, radiance, trace_layers};
 use crate::transport::{Sampler, World};
 use crate::view::layers::LayerImages;
@@ -22,18 +24,25 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Samples and depth of a path-traced frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PathTraceParams {
     /// Samples a pixel.
     pub spp: u32,
     /// Depth and termination.
     pub path: PathParams,
+    /// Reconstruction filter, the same for all layers.
+    #[serde(default, skip_serializing_if = "is_box")]
+    pub filter: Filter,
+}
+
+fn is_box(filter: &Filter) -> bool {
+    *filter == Filter::Box
 }
 
 impl Default for PathTraceParams {
     fn default() -> Self {
-        Self { spp: 64, path: PathParams::default() }
+        Self { spp: 64, path: PathParams::default(), filter: Filter::Box }
     }
 }
 
@@ -47,7 +56,7 @@ pub fn path_trace_full(
     progress: &dyn Progress,
 ) -> Vec<Rgb> {
     let sample = |ray: &Ray, sampler: &mut Sampler| [radiance(world, ray, &params.path, sampler)];
-    image(camera, params.spp, seed, frame, &sample, progress).into_iter().map(|[full]| full).collect()
+    image(camera, params, seed, frame, &sample, progress).into_iter().map(|[full]| full).collect()
 }
 
 /// Renders frame number `frame` of a path from `camera`. Advances `progress` by one a row; start and finish are the caller's.
@@ -63,7 +72,7 @@ pub fn path_trace(
         let Layers { emission, diffuse, glossy } = trace_layers(world, ray, &params.path, sampler);
         [emission, diffuse, glossy]
     };
-    let pixels = image(camera, params.spp, seed, frame, &sample, progress);
+    let pixels = image(camera, params, seed, frame, &sample, progress);
     let layer = |k: usize| pixels.iter().map(|p| p[k]).collect();
     LayerImages { emission: layer(0), diffuse: layer(1), glossy: layer(2) }
 }
@@ -71,13 +80,15 @@ pub fn path_trace(
 /// Means of `N` quantities over the samples of every pixel.
 fn image<const N: usize>(
     camera: &Camera,
-    spp: u32,
+    params: &PathTraceParams,
     seed: u32,
     frame: u32,
     sample: &(dyn Fn(&Ray, &mut Sampler) -> [Rgb; N] + Sync),
     progress: &dyn Progress,
 ) -> Vec<[Rgb; N]> {
     let [width, height] = camera.size;
+    let spp = params.spp;
+    let filter = (params.filter != Filter::Box).then(|| camera.size.map(|side| FilterSamples::new(params.filter, side)));
     let pixel = |x: u32, y: u32| {
         let stream = hash_words(&[seed, frame, y * width + x]);
         let corner = Vec2::new(x as f32, y as f32);
@@ -85,9 +96,16 @@ fn image<const N: usize>(
         for index in 0..spp {
             let mut sampler = Sampler::new(stream, index);
             let [dx, dy, lens_x, lens_y] = sampler.next_4d();
-            let ray = camera.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y));
+            let (at, weight) = match &filter {
+                None => (corner + Vec2::new(dx, dy), 1.0),
+                Some([across, down]) => {
+                    let ((at_x, weight_x), (at_y, weight_y)) = (across.sample(x, dx), down.sample(y, dy));
+                    (Vec2::new(at_x, at_y), weight_x * weight_y)
+                }
+            };
+            let ray = camera.ray(at, Vec2::new(lens_x, lens_y));
             for (sum, value) in sums.iter_mut().zip(sample(&ray, &mut sampler)) {
-                *sum += value.as_dvec3();
+                *sum += (value * weight).as_dvec3();
             }
         }
         sums.map(|s| (s / f64::from(spp.max(1))).as_vec3())

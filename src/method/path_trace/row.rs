@@ -8,7 +8,9 @@ use crate::base::clock::Clock;
 use crate::base::named::{Parameters, apply, tree, within};
 use crate::base::progress::Progress;
 use crate::gpu::{Gpu, GpuScene};
-use crate::method::{Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
+use crate::method::{FilterChoice, Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
+use crate::scene::Scene;
+use crate::scene::film::Filter;
 use crate::transport::World;
 use crate::transport::path::PathParams;
 use crate::view::View;
@@ -23,11 +25,13 @@ pub const METHOD: Method = Method {
     about: "The reference: path tracing",
     reads: Reads::NOTHING,
     layers: &["emission", "diffuse", "glossy"],
-    options: &["spp", "max-depth", "denoise", "layers", "budget-ms", "match-time", "set"],
+    options: &["spp", "max-depth", "denoise", "layers", "rfilter", "budget-ms", "match-time", "set"],
     samples: Some(Samples { option: "spp", pointer: "/path_trace/spp" }),
     transmissive: true,
+    orthographic: true,
     sequential: false,
     parameters,
+    for_scene,
     cpu,
     gpu: Some(gpu),
 };
@@ -38,6 +42,12 @@ pub const METHOD: Method = Method {
 struct Params {
     path_trace: PathTraceParams,
     layers: LayerChoice,
+    /// Most vertices, where the options say so; the scene does otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    max_depth: Option<u32>,
+    /// Reconstruction filter, until the scene is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rfilter: Option<FilterChoice>,
     /// Of the filter; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     denoise: Option<DenoiseParams>,
@@ -51,13 +61,29 @@ fn parameters(options: &Options) -> Result<Value> {
         return Err(Error::Request("--denoise filters layer by layer: leave --layers full out".into()));
     }
     let base = PathTraceParams::default();
-    let path_trace = PathTraceParams {
-        spp: options.spp.unwrap_or(base.spp),
-        path: PathParams { max_depth: options.max_depth.unwrap_or(base.path.max_depth), ..base.path },
-    };
+    let path_trace = PathTraceParams { spp: options.spp.unwrap_or(base.spp), ..base };
     path_trace.validate()?;
     let denoise = options.denoise.then(|| apply(&DenoiseParams::default(), &options.set)).transpose()?;
-    tree(&Params { path_trace, layers: options.layers.unwrap_or_default(), denoise })
+    let Options { layers, max_depth, rfilter, .. } = *options;
+    tree(&Params { path_trace, layers: layers.unwrap_or_default(), max_depth, rfilter, denoise })
+}
+
+/// Depth, roulette and filter: the options', or else the scene's; a box where nobody has chosen.
+fn for_scene(parameters: Value, scene: &Scene) -> Result<(Value, Vec<String>)> {
+    let mut params: Params = serde_json::from_value(parameters).map_err(|e| Error::Request(e.to_string()))?;
+    let path = PathParams::of(scene);
+    params.path_trace.path = PathParams { max_depth: params.max_depth.take().unwrap_or(path.max_depth), ..path };
+    let film = &scene.film_filter;
+    let mut warnings = Vec::new();
+    params.path_trace.filter = match (params.rfilter.take(), &film.named) {
+        (Some(FilterChoice::Scene), _) => film.filter,
+        (None, Some(named)) if film.filter != Filter::Box => {
+            warnings.push(format!("the film's filter, {named}, is not used, but a box: see --rfilter"));
+            Filter::Box
+        }
+        _ => Filter::Box,
+    };
+    Ok((tree(&params)?, warnings))
 }
 
 impl Parameters for PathTraceParams {
@@ -116,7 +142,10 @@ struct OnGpu {
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     check_lit(setup.world)?;
-    let Params { path_trace, layers, denoise } = setup.parameters()?;
+    let Params { path_trace, layers, denoise, .. } = setup.parameters()?;
+    if path_trace.filter != Filter::Box {
+        return Err(Error::Request("the GPU's path tracer has a box filter alone; use --device cpu".into()));
+    }
     let scene = Arc::new(GpuScene::new(gpu, setup.world)?);
     let denoiser = denoise.map(|d| Denoiser::new(scene.clone(), &d)).transpose()?;
     let tracer = PathTracer::new(scene, &path_trace.path, layers == LayerChoice::All)?;

@@ -7,7 +7,7 @@ use crate::base::clock::Clock;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::gpu::Gpu;
-use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup};
+use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
 use crate::probe::store::ProbeStore;
 use crate::transport::World;
 use crate::view::View;
@@ -25,8 +25,10 @@ pub const METHOD: Method = Method {
     options: &["probes", "lightmap", "supersample", "gpu-memory", "set"],
     samples: None,
     transmissive: false,
+    orthographic: false,
     sequential: false,
     parameters,
+    for_scene: as_given,
     cpu,
     gpu: Some(gpu),
 };

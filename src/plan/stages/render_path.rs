@@ -1,12 +1,13 @@
 //! `render-path`.
 
 use crate::base::clock::timed;
+use crate::gpu::camera;
 use crate::io::Provenance;
 use crate::io::provenance::hash_file;
 use crate::lightmap::LightMap;
 use crate::method::glossy_probes::wanted::Served;
 use crate::method::glossy_probes::{self, GlossyProbeParams};
-use crate::method::{LayerChoice, METHODS, Method, Need, Options, Renderer, Setup};
+use crate::method::{FilterChoice, LayerChoice, METHODS, Method, Need, Options, Renderer, Setup};
 use crate::plan::budget::{self, Budget};
 use crate::plan::frames::{Frames, render};
 use crate::plan::option::{Size, stage};
@@ -18,6 +19,7 @@ use crate::probe::store::{SET_FILE, set_hash};
 use crate::scene::Camera;
 use crate::surface::{CurvatureMap, curvature_file};
 use crate::transport::World;
+use crate::view::View;
 use crate::{Error, Result};
 use serde::de::IgnoredAny;
 use serde_json::{Value, json};
@@ -59,6 +61,8 @@ stage! {
         "--max-depth" max_depth: Option<u32>,
         /// What to write of a path-traced frame.
         "--layers" layers: Option<LayerChoice>,
+        /// Reconstruction filter of path-traced frames.
+        "--rfilter" rfilter: Option<FilterChoice>,
         /// Filter path-traced layers.
         "--denoise" denoise: bool,
         /// Choose the samples with which a frame takes so many milliseconds.
@@ -107,7 +111,8 @@ macro_rules! words {
 }
 words!(Aov { All "all" });
 words!(LayerChoice { All "all", Full "full" });
-crate::plan::option::text!(Aov, LayerChoice);
+words!(FilterChoice { Box "box", Scene "scene" });
+crate::plan::option::text!(Aov, LayerChoice, FilterChoice);
 
 /// Options that make sense together: what is computed.
 pub struct Resolved {
@@ -132,7 +137,7 @@ impl RenderPath {
     }
 
     /// Options that not every method uses, and whether they are given.
-    fn given(&self) -> [(&'static str, bool); 14] {
+    fn given(&self) -> [(&'static str, bool); 15] {
         [
             ("probes", self.probes.is_some()),
             ("lightmap", self.lightmap.is_some()),
@@ -142,6 +147,7 @@ impl RenderPath {
             ("samples", self.samples.is_some()),
             ("max-depth", self.max_depth.is_some()),
             ("layers", self.layers.is_some()),
+            ("rfilter", self.rfilter.is_some()),
             ("denoise", self.denoise),
             ("budget-ms", self.budget_ms.is_some()),
             ("match-time", self.match_time.is_some()),
@@ -179,6 +185,7 @@ impl RenderPath {
             samples: self.samples,
             max_depth: self.max_depth,
             layers: self.layers,
+            rfilter: self.rfilter,
             denoise: self.denoise,
             paper: self.paper,
             set: self.set.clone(),
@@ -207,6 +214,9 @@ impl RenderPath {
         let mut timings = Timings::of(method.name);
         let Inputs { world, lightmap, curvature, provenance } = self.inputs(cx, method, &mut timings)?;
         let views = views(cx, &world.scene, self.path.as_deref(), self.size.map(|s| s.0), self.frames.as_ref())?;
+        refuse_parallel(method, &views)?;
+        let (parameters, warnings) = (method.for_scene)(parameters, &world.scene)?;
+        warnings.iter().for_each(|w| cx.listener.warn(w));
         let budget = Budget::read(self.budget_ms, self.match_time.as_deref(), cx)?;
         let setup = Setup {
             world: &world,
@@ -264,10 +274,25 @@ impl RenderPath {
     }
 }
 
+/// An error where a view has parallel rays that the method does not know.
+fn refuse_parallel(method: &Method, views: &[View]) -> Result<()> {
+    if !method.orthographic && views.iter().any(|v| v.camera.orthographic.is_some()) {
+        let others: Vec<&str> = METHODS.iter().filter(|m| m.orthographic).map(|m| m.name).collect();
+        let (name, others) = (method.name, others.join(", "));
+        return Err(Error::Request(format!(
+            "--method {name} has no orthographic camera: use --method {others}, or give a camera path with --path"
+        )));
+    }
+    Ok(())
+}
+
 /// The method's renderer, on the GPU that is asked for or on the CPU.
 fn make<'a>(cx: &Context, method: &Method, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let on_gpu = match method.gpu {
-        Some(make) => cx.on_gpu(|gpu| make(gpu, setup))?,
+        Some(make) => cx.on_gpu(|gpu| {
+            camera::check(&setup.world.scene, setup.views.iter().map(|v| &v.camera))?;
+            make(gpu, setup)
+        })?,
         None => {
             cx.refuse_gpu(&format!("--method {}", method.name))?;
             None
@@ -319,6 +344,7 @@ mod tests {
                 ("samples", Some("4")),
                 ("max-depth", Some("4")),
                 ("layers", Some("all")),
+                ("rfilter", Some("scene")),
                 ("denoise", None),
                 ("budget-ms", Some("100")),
                 ("match-time", Some("other")),

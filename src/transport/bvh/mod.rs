@@ -8,6 +8,7 @@
 //! sheet (a blind, a leaf) count once, as in Mitsuba, which steps over the second: see [`SHEET`].
 
 mod cut;
+mod round;
 mod simd;
 #[cfg(test)]
 mod tests;
@@ -19,12 +20,13 @@ use super::facet::uv_at;
 use crate::base::math::{hash_words, unit};
 use crate::base::ray::{Hit, Ray};
 use crate::scene::normals::unit_normal;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Round, Scene};
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use round::RoundTree;
 #[cfg(target_arch = "x86_64")]
 use simd::{Avx2, Avx512, Portable, Simd};
 use std::cell::RefCell;
@@ -45,6 +47,8 @@ const SHEET: f32 = 16.0 * 1500.0 * 0.5 * f32::EPSILON;
 /// Acceleration structure over the triangles of a scene (all, or the opaque ones only).
 pub struct Bvh {
     tree: Tree,
+    /// What is met as a round shape; its triangles are not in `tree`.
+    rounds: Option<RoundTree>,
     /// The triangles that it is built over.
     kept: Vec<u32>,
     margin: f32,
@@ -58,13 +62,17 @@ impl Bvh {
         let geometry = &scene.geometry;
         let count = geometry.triangles.len() as u32;
         let has_area = |t| unit_normal(geometry.corners(t)).is_some();
-        let kept: Vec<u32> = (0..count).filter(|&t| keep(t) && has_area(t)).collect();
+        let flat = |t| geometry.rounds.is_empty() || geometry.round(t).is_none();
+        let kept: Vec<u32> = (0..count).filter(|&t| keep(t) && flat(t) && has_area(t)).collect();
         let has_opacity: Vec<bool> = scene.materials.iter().map(|m| m.opacity.is_some()).collect();
         let masked = |t| has_opacity.get(geometry.object(t).material as usize).copied().unwrap_or(false);
         let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
         let margin = extent * BOX_MARGIN;
+        let round_extent =
+            geometry.rounds.iter().flat_map(Round::bounds).fold(extent, |m, p| m.max(p.abs().max_element() as f32));
         Self {
-            tree: Tree::new(&binary_tree(geometry, &kept, margin), &kept, geometry, &masked),
+            tree: Tree::new(&triangle_tree(geometry, &kept, margin), &kept, geometry, &masked),
+            rounds: RoundTree::build(geometry, keep, round_extent * BOX_MARGIN),
             kept,
             margin,
             #[cfg(target_arch = "x86_64")]
@@ -74,6 +82,14 @@ impl Bvh {
 
     /// First hit in [t_min, t_max]. Alpha-masked triangles are passed where a hash of ray and triangle says so.
     pub fn closest(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
+        let flat = self.closest_triangle(scene, ray);
+        match &self.rounds {
+            Some(rounds) => rounds.closest(scene, ray, flat, &mut |hit| passes(scene, ray, hit)),
+            None => flat,
+        }
+    }
+
+    fn closest_triangle(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
         let passes = &mut |hit: &Hit| passes(scene, ray, hit);
         #[cfg(target_arch = "x86_64")]
         match self.lanes {
@@ -87,6 +103,11 @@ impl Bvh {
 
     /// Whether anything lies in [t_min, t_max].
     pub fn occluded(&self, scene: &Scene, ray: &Ray) -> bool {
+        let by_round = |rounds: &RoundTree| rounds.occluded(scene, ray, &mut |hit| passes(scene, ray, hit));
+        self.triangle_occludes(scene, ray) || self.rounds.as_ref().is_some_and(by_round)
+    }
+
+    fn triangle_occludes(&self, scene: &Scene, ray: &Ray) -> bool {
         let passes = &mut |hit: &Hit| passes(scene, ray, hit);
         #[cfg(target_arch = "x86_64")]
         match self.lanes {
@@ -101,7 +122,7 @@ impl Bvh {
     /// The same triangles in the compressed tree that GPUs read, and their indices in the order of its leaves. `geometry` is what
     /// the tree was built from.
     pub fn compressed(&self, geometry: &Geometry) -> (CwBvh, Vec<u32>) {
-        let tree = bvh2_to_cwbvh(&binary_tree(geometry, &self.kept, self.margin), MAX_COMPRESSED_LEAF, true, false);
+        let tree = bvh2_to_cwbvh(&triangle_tree(geometry, &self.kept, self.margin), MAX_COMPRESSED_LEAF, true, false);
         let triangles = tree.primitive_indices.iter().map(|&i| self.kept[i as usize]).collect();
         (tree, triangles)
     }
@@ -124,18 +145,23 @@ impl Lanes {
     }
 }
 
-/// obvhs's medium build up to its leaves, spelled out: its own function checks the tree for seconds in builds with debug
-/// assertions.
-fn binary_tree(geometry: &Geometry, kept: &[u32], margin: f32) -> Bvh2 {
+/// The binary tree over some triangles, their boxes widened by `margin`.
+fn triangle_tree(geometry: &Geometry, kept: &[u32], margin: f32) -> Bvh2 {
     let margin = Vec3A::splat(margin);
     let boxes: Vec<Aabb> = kept
         .iter()
         .map(|&t| Aabb::from_points(&geometry.corners(t).map(|p| p.to_vec3a())))
         .map(|b| Aabb::new(b.min - margin, b.max + margin))
         .collect();
+    binary_tree(&boxes)
+}
+
+/// obvhs's medium build up to its leaves, spelled out: its own function checks the tree for seconds in builds with debug
+/// assertions.
+fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     let indices = (0..boxes.len() as u32).collect();
     let mut tree =
-        PlocBuilder::with_capacity(boxes.len()).build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
+        PlocBuilder::with_capacity(boxes.len()).build(PlocSearchDistance::Medium, boxes, indices, SortPrecision::U64, 3);
     let mut optimizer = ReinsertionOptimizer::default();
     optimizer.run(&mut tree, 0.1, None);
     tree

@@ -1,12 +1,15 @@
 //! Emitters that stand by themselves.
 
 use super::Builder;
+use super::sensor::fov_x;
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::exchange::mitsuba::params::Params;
-use crate::exchange::mitsuba::tree::Node;
+use crate::exchange::mitsuba::tree::{Kind, Node, Param, Value};
+use crate::material::Texture;
 use crate::scene::Emitter;
-use glam::{Affine3A, Mat4, Vec3};
+use crate::scene::emitter::Pattern;
+use glam::{Affine3A, Mat4, Vec2, Vec3};
 
 impl<'a> Builder<'a> {
     /// Adds an emitter.
@@ -43,14 +46,23 @@ impl<'a> Builder<'a> {
                     let message = format!("cutoff_angle = {cutoff}, beam_width = {beam}: expected beam <= cutoff <= 180");
                     return Err(node.at.error(message));
                 }
+                let pattern = match p.has("texture") {
+                    true => {
+                        let (texture, half) = (self.textured(p, "texture", 1.0)?, Vec2::splat(cutoff.to_radians().tan()));
+                        Some(Box::new(Pattern { texture, to_local: inverse(&to_world), half }))
+                    }
+                    false => None,
+                };
                 Emitter::Spot {
                     position: to_world.transform_point3(Vec3::ZERO),
                     direction: axis(p, &to_world)?,
                     intensity,
                     cutoff_rad: cutoff.to_radians(),
                     beam_rad: beam.to_radians(),
+                    pattern,
                 }
             }
+            "projector" => self.projector(p)?,
             "directional" => {
                 let irradiance = p.color("irradiance", Rgb::ONE)?;
                 let direction = match p.vector("direction")? {
@@ -62,13 +74,58 @@ impl<'a> Builder<'a> {
                 };
                 Emitter::Directional { direction, irradiance }
             }
-            "area" => return Err(node.at.error("found an area emitter by itself, expected it within a shape")),
-            _ => return Err(Self::unknown(node, "emitter", "area, envmap, constant, point, spot, directional")),
+            "area" => return self.area_by_itself(node),
+            "sky" | "sun" | "sunsky" | "timed_sunsky" => {
+                let message =
+                    format!("{}: the sun and sky models are not read: render them with Mitsuba to an envmap", node.plugin);
+                return Err(node.at.error(message));
+            }
+            _ => return Err(Self::unknown(node, "emitter", "area, envmap, constant, point, spot, directional, projector")),
         };
         params.finish(&mut self.scene.warnings);
         self.scene.emitters.push(emitter);
         Ok(())
     }
+}
+
+impl<'a> Builder<'a> {
+    /// An area light directly under the scene is for shapes to refer to.
+    fn area_by_itself(&mut self, node: &'a Node) -> Result<()> {
+        let is_it = |p: &Param| matches!(&p.value, Value::Reference(id) if node.id.as_deref() == Some(id.as_str()));
+        let uses = |shape: &&Node| shape.kind == Kind::Shape && shape.params.iter().any(is_it);
+        let plugins = self.children.iter().filter_map(|c| match &c.value {
+            Value::Plugin(node) => Some(node),
+            _ => None,
+        });
+        match plugins.into_iter().any(|plugin| uses(&plugin)) {
+            true => Ok(()),
+            false => Err(node.at.error("found an area emitter that no shape holds or refers to")),
+        }
+    }
+
+    fn projector(&mut self, p: &mut Params<'a>) -> Result<Emitter> {
+        let texture = self.textured(p, "irradiance", 1.0)?;
+        let size = match &texture {
+            Texture::Bitmap(bitmap) => [bitmap.image.width as u32, bitmap.image.height as u32],
+            _ => [1, 1],
+        };
+        let fov_x = fov_x(p, size)?;
+        let scale = not_negative(p, "scale", 1.0)?;
+        let to_world = self.placed(p)?.as_mat4();
+        let half_x = (0.5 * fov_x).tan();
+        let half = Vec2::new(half_x, half_x * size[1] as f32 / size[0] as f32);
+        Ok(Emitter::Projector {
+            position: to_world.transform_point3(Vec3::ZERO),
+            direction: axis(p, &to_world)?,
+            // Mitsuba's camera space has x to the left and y up, and v goes down.
+            image: Box::new(Pattern { texture: texture.scaled(scale), to_local: inverse(&to_world), half: -half }),
+            cutoff_rad: half.length().atan(),
+        })
+    }
+}
+
+fn inverse(to_world: &Mat4) -> Affine3A {
+    Affine3A::from_mat4(*to_world).inverse()
 }
 
 /// The world direction of local +Z.

@@ -4,6 +4,8 @@ mod attribute;
 mod bsdf;
 mod emitter;
 mod group;
+mod integrator;
+mod round;
 mod sensor;
 mod shape;
 mod texture;
@@ -16,6 +18,7 @@ use crate::scene::Scene;
 use crate::{Error, Result};
 use attribute::Current;
 use glam::DMat4;
+use round::Crowd;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -52,12 +55,14 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let hash = hash::scene(&children, &ids, &assets, options.unit_scale);
     let mut builder = Builder {
         ids: &ids,
+        children: &children,
         assets: &assets,
         unit_scale: options.unit_scale,
         skip_unsupported: options.skip_unsupported,
         scene: Scene { hash, path: path.to_owned(), warnings, ..Scene::default() },
         materials: BTreeMap::new(),
         default_material: None,
+        lamp_material: None,
         built: 0,
         environments: 0,
         current: None,
@@ -65,7 +70,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         instance: None,
         groups: 0,
         grouped: 0,
+        crowd: Crowd::new(),
     };
+    builder.crowd = builder.crowd();
     builder.count_copies(&children)?;
     let mut results = vec![builder.foreign(&children)];
     for child in &children {
@@ -78,6 +85,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     }
     Error::gather(results).map_err(|e| hint(e, path))?;
     let mut scene = builder.scene;
+    if let Some(sensor) = &mut scene.sensor {
+        sensor.drop_idle_clip(&scene.geometry);
+    }
     if scene.geometry.triangles.is_empty() {
         return Err(Error::input(path, "the scene has no triangles"));
     }
@@ -109,6 +119,8 @@ fn hint(e: Error, path: &Path) -> Error {
 /// Builds a scene plugin by plugin.
 struct Builder<'a> {
     ids: &'a Ids<'a>,
+    /// What stands directly under the scene.
+    children: &'a [Param],
     assets: &'a Assets,
     unit_scale: f32,
     skip_unsupported: bool,
@@ -116,6 +128,8 @@ struct Builder<'a> {
     /// Material of each scattering model that stands by itself, by its place in memory: looked up, never listed.
     materials: BTreeMap<*const Node, u32>,
     default_material: Option<u32>,
+    /// Of emitting shapes without a scattering model.
+    lamp_material: Option<u32>,
     /// Scattering models and textures so far.
     built: usize,
     /// Environment emitters so far; Mitsuba allows one.
@@ -130,6 +144,8 @@ struct Builder<'a> {
     groups: usize,
     /// Shapes in groups so far.
     grouped: usize,
+    /// Round shapes that are too many for fine meshes.
+    crowd: Crowd,
 }
 
 impl<'a> Builder<'a> {
@@ -196,11 +212,7 @@ impl<'a> Builder<'a> {
             }
             // A texture acts where something refers to it; still, a wrong one should not pass.
             Kind::Texture => self.texture(node).map(|_| ()),
-            Kind::Integrator => {
-                let depth = self.params(node).integer("max_depth", -1, -1, i64::from(u32::MAX))?;
-                self.scene.max_depth = u32::try_from(depth).ok();
-                Ok(())
-            }
+            Kind::Integrator => self.integrator(node),
             Kind::Film | Kind::Other | Kind::Unsupported => Ok(()),
         }
     }

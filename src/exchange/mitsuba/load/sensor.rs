@@ -6,7 +6,8 @@ use crate::exchange::mitsuba::params::{Params, number_of, wrong};
 use crate::exchange::mitsuba::tree::{Kind, Node, Value};
 use crate::scene::Camera;
 use crate::scene::camera::FovAxis;
-use glam::{Affine3A, DMat4, Mat3A};
+use crate::scene::film::{FilmFilter, Filter};
+use glam::{Affine3A, DMat4, Mat3A, Vec2};
 
 const AXES: [(&str, FovAxis); 5] = [
     ("x", FovAxis::X),
@@ -22,30 +23,32 @@ const FILM_DIAGONAL_MM: f32 = 43.266_615;
 /// Longest side of a film, pixels.
 const MAX_SIDE: i64 = 65_536;
 
+/// What stands for `near_clip` and `far_clip` where only one is given.
+const EVERYTHING: (f32, f32) = (0.0, f32::INFINITY);
+
+/// A film's size and the part of it that is rendered, pixels.
+struct Window {
+    film: [u32; 2],
+    offset: [u32; 2],
+    size: [u32; 2],
+}
+
 impl<'a> Builder<'a> {
     /// The scene's own camera.
     pub(super) fn sensor(&mut self, node: &'a Node) -> Result<()> {
         let mut params = self.params(node);
         let p = &mut params;
-        let lens = match node.plugin.as_str() {
-            "perspective" => false,
-            "thinlens" => true,
-            _ => return Err(Self::unknown(node, "sensor", "perspective, thinlens")),
+        let (lens, parallel) = match node.plugin.as_str() {
+            "perspective" => (false, false),
+            "thinlens" => (true, false),
+            "orthographic" => (false, true),
+            _ => return Err(Self::unknown(node, "sensor", "perspective, thinlens, orthographic")),
         };
-        p.accept(&["near_clip", "far_clip", "shutter_open", "shutter_close", "srf"]);
+        p.accept(&["shutter_open", "shutter_close", "srf"]);
         p.children(Kind::Other)?;
-        let mut size = [768, 576];
-        for film in p.children(Kind::Film)? {
-            let mut film = self.params(film);
-            for (i, side) in ["width", "height"].into_iter().enumerate() {
-                size[i] = film.integer(side, i64::from(size[i]), 1, MAX_SIDE)? as u32;
-            }
-            if film.has("crop_width") || film.has("crop_height") {
-                let at = film.at("crop_width");
-                self.scene.warnings.push(at.warning("the film's crop window is ignored: the whole film is rendered"));
-            }
-        }
-        let fov_x = fov_x(p, size)?;
+        let window = self.film(p)?;
+        // Axes and clipping planes are about the whole film, also where only a part of it is rendered.
+        let fov_x = if parallel { 1.0 } else { fov_x(p, window.film)? };
         let (aperture_radius, focus_distance) = match lens {
             true => (p.positive("aperture_radius", 1.0)?, p.positive("focus_distance", 1.0)?),
             // Perspective sensors of Mitsuba 0.6 carry a distance that they do not use.
@@ -54,16 +57,104 @@ impl<'a> Builder<'a> {
         if lens && !p.has("aperture_radius") {
             return Err(node.at.error("thinlens has no \"aperture_radius\""));
         }
+        let principal_point = match parallel {
+            true => Vec2::ZERO,
+            false => Vec2::new(p.f32("principal_point_offset_x", 0.0)?, p.f32("principal_point_offset_y", 0.0)?),
+        };
+        let clip = clip(p)?;
         let placed = self.placed(p)?;
         let to_world = rigid(&placed).ok_or_else(|| p.at("to_world").error("the sensor's axes do not span space"))?;
         params.finish(&mut self.scene.warnings);
-        let (aperture_radius, focus_distance) = (aperture_radius * self.unit_scale, focus_distance * self.unit_scale);
-        self.scene.sensor = Some(Camera { to_world, fov_x, size, aperture_radius, focus_distance });
+
+        let whole = Vec2::new(window.film[0] as f32, window.film[1] as f32);
+        let part = Vec2::new(window.size[0] as f32, window.size[1] as f32);
+        let axis = whole * (0.5 - principal_point) - Vec2::new(window.offset[0] as f32, window.offset[1] as f32);
+        let narrower = part.x / whole.x;
+        let mut camera = Camera::pinhole(to_world, fov_x, window.size);
+        if narrower != 1.0 {
+            camera.fov_x = 2.0 * (narrower * (0.5 * fov_x).tan()).atan();
+        }
+        (camera.aperture_radius, camera.focus_distance) = (aperture_radius * self.unit_scale, focus_distance * self.unit_scale);
+        camera.shift = axis / part - 0.5;
+        let [x, y, z] = [0, 1, 2].map(|k| placed.col(k).truncate().length() as f32);
+        camera.clip = [clip.0 * self.unit_scale, clip.1 * self.unit_scale];
+        if parallel {
+            camera.orthographic = Some(Vec2::new(x, y) * narrower);
+            // As Mitsuba: the near plane is scaled with the camera, the way to the far one is not.
+            let near = clip.0 * z;
+            camera.clip = [near, near + camera.clip[1] - camera.clip[0]];
+        }
+        self.scene.sensor = Some(camera);
         Ok(())
+    }
+
+    /// The film's size, crop window and filter.
+    fn film(&mut self, p: &mut Params<'a>) -> Result<Window> {
+        let mut window = Window { film: [768, 576], offset: [0; 2], size: [768, 576] };
+        self.scene.film_filter.filter = Filter::Gaussian(0.5);
+        for node in p.children(Kind::Film)? {
+            let mut film = self.params(node);
+            for (i, side) in ["width", "height"].into_iter().enumerate() {
+                window.film[i] = film.integer(side, i64::from(window.film[i]), 1, MAX_SIDE)? as u32;
+            }
+            for (i, axis) in ["x", "y"].into_iter().enumerate() {
+                let (whole, extent) = (i64::from(window.film[i]), ["crop_width", "crop_height"][i]);
+                window.offset[i] = film.integer(&format!("crop_offset_{axis}"), 0, 0, MAX_SIDE)? as u32;
+                let rest = whole - i64::from(window.offset[i]);
+                let size = film.integer(extent, whole, 1, MAX_SIDE)?;
+                if size > rest {
+                    let message = format!("{extent} = {size} from {} on: the film has {whole} pixels", window.offset[i]);
+                    return Err(film.at(extent).error(message));
+                }
+                window.size[i] = size as u32;
+            }
+            for filter in film.children(Kind::Other)? {
+                if let Some(found) = self.filter(filter)? {
+                    let named = format!("{} ({}:{})", filter.plugin, filter.at.file.display(), filter.at.line);
+                    self.scene.film_filter = FilmFilter { filter: found, named: Some(named) };
+                }
+            }
+        }
+        Ok(window)
+    }
+
+    /// A reconstruction filter; `None` for other plugins of a film.
+    fn filter(&mut self, node: &'a Node) -> Result<Option<Filter>> {
+        let mut params = self.params(node);
+        let p = &mut params;
+        let third = 1.0 / 3.0;
+        let filter = match node.plugin.as_str() {
+            "box" => {
+                p.accept(&["radius"]);
+                Filter::Box
+            }
+            "tent" => Filter::Tent(f64::from(p.positive("radius", 1.0)?)),
+            "gaussian" => Filter::Gaussian(f64::from(p.positive("stddev", 0.5)?)),
+            "mitchell" => Filter::Mitchell(f64::from(p.f32("b", third)?), f64::from(p.f32("c", third)?)),
+            "catmullrom" => Filter::Mitchell(0.0, 0.5),
+            "lanczos" => Filter::Lanczos(p.integer("lobes", 3, 1, 16)? as f64),
+            _ => {
+                self.scene.warnings.push(node.at.warning(format!("unknown filter \"{}\": a Gaussian stands in", node.plugin)));
+                return Ok(None);
+            }
+        };
+        params.finish(&mut self.scene.warnings);
+        Ok(Some(filter))
     }
 }
 
-fn fov_x(p: &mut Params, size: [u32; 2]) -> Result<f32> {
+/// `near_clip` and `far_clip`. *Ours*: without them nothing is cut off, where Mitsuba takes 0.01 and 10,000 in whatever unit.
+fn clip(p: &mut Params) -> Result<(f32, f32)> {
+    let (near, far) = (p.f32("near_clip", EVERYTHING.0)?, if p.has("far_clip") { p.f32("far_clip", 0.0)? } else { EVERYTHING.1 });
+    if near < 0.0 || near >= far {
+        let name = if p.has("far_clip") { "far_clip" } else { "near_clip" };
+        return Err(p.at(name).error(format!("near_clip = {near}, far_clip = {far}: expected 0 <= near < far")));
+    }
+    Ok((near, far))
+}
+
+/// Horizontal field of view, radians, of an image of `size`, by `fov` and `fov_axis` or by `focal_length`.
+pub(super) fn fov_x(p: &mut Params, size: [u32; 2]) -> Result<f32> {
     let axis = p.choice("fov_axis", FovAxis::X, &AXES)?;
     let (fov, axis) = if p.has("fov") {
         let fov = p.f32("fov", 0.0)?;

@@ -2,9 +2,12 @@
 
 use super::Builder;
 use super::attribute::Current;
+use super::round::{cylinder, described};
+use crate::base::math::Rgb;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node};
-use crate::material::Texture;
+use crate::material::bsdf::{Bsdf, Diffuse};
+use crate::material::{Material, Texture};
 use crate::scene::mesh::{Mesh, append, swaps_corners};
 use crate::scene::{Emitter, primitives};
 use crate::{Error, Result};
@@ -23,8 +26,14 @@ impl<'a> Builder<'a> {
             (None, true) => p.file()?.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
             (None, false) => node.plugin.clone(),
         };
-        let mesh = self.mesh(p);
-        let to_world = self.placed(p)?;
+        let round = match self.crowd.get(&(node as *const Node)) {
+            Some(&cells) => self.round_space(p)?.map(|(kind, to_world)| (kind, to_world, cells)),
+            None => None,
+        };
+        let (mesh, to_world) = match round {
+            Some((kind, to_world, cells)) => (Ok(kind.mesh(cells)), to_world),
+            None => (self.mesh(p), self.placed(p)?),
+        };
         // Mitsuba takes a mirrored sphere for one of negative radius, and its other shapes not.
         let inside_out = node.plugin == "sphere" && p.transform("to_world")?.determinant() < 0.0;
         let flip = p.bool("flip_normals", false)? != inside_out;
@@ -35,6 +44,7 @@ impl<'a> Builder<'a> {
         let swapped = mesh.as_ref().is_ok_and(|m| swaps_corners(m, &to_world.as_mat4(), flip, face));
         self.current = Some(Current { node, swapped });
         let material = match p.children(Kind::Bsdf)?.as_slice() {
+            [] if !p.children(Kind::Emitter)?.is_empty() => Ok(self.lamp_material()),
             [] => Ok(self.default_material()),
             [bsdf] => self.material(bsdf, &name),
             [_, second, ..] => return Err(second.at.error(format!("{}: a shape has one bsdf", node.plugin))),
@@ -54,7 +64,11 @@ impl<'a> Builder<'a> {
         if g.positions.len() + mesh.positions.len() > most || g.triangles.len() + mesh.triangles.len() > most {
             return Err(node.at.error(format!("the scene has more than {most} vertices or triangles")));
         }
-        append(g, mesh, to_world.as_mat4(), flip, face, name, material, emitter);
+        if let Some((kind, to_world, cells)) = round {
+            let (first, object) = (g.triangles.len() as u32, g.objects.len() as u32);
+            g.rounds.push(described(kind, to_world, cells, flip, first, object));
+        }
+        append(g, mesh, to_world.as_mat4(), flip, face && round.is_none(), name, material, emitter);
         Ok(())
     }
 
@@ -80,11 +94,8 @@ impl<'a> Builder<'a> {
                 primitives::sphere(center, p.positive("radius", 1.0)?)
             }
             "cylinder" => {
-                let (p0, p1) = (p.vector("p0")?.unwrap_or(Vec3::ZERO), p.vector("p1")?.unwrap_or(Vec3::Z));
-                if p0 == p1 {
-                    return Err(p.at("p1").error("cylinder: p0 and p1 are the same point"));
-                }
-                primitives::cylinder(p0, p1, p.positive("radius", 1.0)?)
+                let (p0, p1, radius) = cylinder(p)?;
+                primitives::cylinder(p0, p1, radius as f32)
             }
             _ => return Err(Self::unknown(p.node, "shape", KNOWN)),
         })
@@ -93,6 +104,15 @@ impl<'a> Builder<'a> {
     /// `to_world`, in the units that the command line asks for.
     pub(super) fn placed(&self, p: &mut Params<'a>) -> Result<DMat4> {
         Ok(DMat4::from_scale(DVec3::splat(f64::from(self.unit_scale))) * self.within_instance(p)?)
+    }
+
+    /// What a shape that emits gets without a scattering model: it reflects nothing, in Mitsuba too.
+    fn lamp_material(&mut self) -> u32 {
+        *self.lamp_material.get_or_insert_with(|| {
+            let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::ZERO) });
+            self.scene.materials.push(Material { name: "lamp".into(), bsdf, opacity: None });
+            self.scene.materials.len() as u32 - 1
+        })
     }
 
     fn area_emitter(&mut self, node: &'a Node) -> Result<u32> {
