@@ -13,9 +13,10 @@ pub use surface::Surface;
 pub use texture::Texture;
 
 /// What a shape is made of.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Material {
     /// The `id` of the scene file, or a made-up name.
+    #[serde(skip)]
     pub name: String,
     /// How it scatters light.
     pub bsdf: Bsdf,

@@ -5,7 +5,7 @@ use crate::base::math::{Rgb, luminance};
 use glam::Vec2;
 
 /// A share of coverage over a surface, nominally in [0, 1].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub enum Opacity {
     /// The luminance of a texture.
     Texture(Texture),

@@ -10,7 +10,7 @@ use glam::{Affine2, Vec2};
 use std::sync::Arc;
 
 /// A spatially varying colour.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub enum Texture {
     /// The same everywhere.
     Constant(Rgb),
@@ -28,7 +28,7 @@ pub enum Texture {
 }
 
 /// Colours of an object's vertices or faces.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Attribute {
     /// The object's first triangle in the scene.
     pub first_triangle: u32,
@@ -57,7 +57,7 @@ impl Attribute {
 }
 
 /// An image with its lookup rules.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Bitmap {
     /// Linear pixels.
     pub image: Arc<Image>,
@@ -72,7 +72,7 @@ pub struct Bitmap {
 }
 
 /// Extension of a bitmap outside [0, 1]².
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub enum Wrap {
     /// Tiled.
     Repeat,

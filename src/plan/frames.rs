@@ -114,10 +114,14 @@ fn choose_samples(views: &[View], renderer: &mut dyn Renderer, budget: &Budget) 
 
 impl Frames<'_> {
     fn provenance_of(&self, view: &View, parameters: &Value) -> Provenance {
-        let parameters = json!({
+        let mut parameters = json!({
             "method": self.method.name, "frame": view.frame, "aov": self.setup.inspect, "camera": describe(&view.camera),
             "parameters": parameters,
         });
+        // What is seen, not what is lit by: no part of the scene's content.
+        if self.setup.world.scene.hide_emitters {
+            parameters["hide_emitters"] = true.into();
+        }
         Provenance { parameters, ..self.provenance.clone() }
     }
 

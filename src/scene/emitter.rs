@@ -7,7 +7,7 @@ use glam::{Affine3A, Vec2, Vec3};
 use std::sync::Arc;
 
 /// A texture thrown from a point.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Pattern {
     /// The colours.
     pub texture: Texture,
@@ -25,7 +25,7 @@ impl Pattern {
 }
 
 /// A light source.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub enum Emitter {
     /// Radiance leaving the front (`area_normal`) side of an object.
     Area {

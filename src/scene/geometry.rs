@@ -23,9 +23,10 @@ pub struct Geometry {
 }
 
 /// One shape of the scene file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Object {
     /// The shape's id, or its file's stem.
+    #[serde(skip)]
     pub name: String,
     /// Its triangles in [`Geometry::triangles`].
     pub triangles: std::ops::Range<u32>,

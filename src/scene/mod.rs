@@ -5,6 +5,7 @@ pub mod camera_path;
 pub mod emitter;
 pub mod film;
 pub mod geometry;
+pub mod hash;
 pub mod mesh;
 pub mod normals;
 pub mod primitives;
@@ -39,7 +40,7 @@ pub struct Scene {
     pub rr_depth: Option<u32>,
     /// The integrator's `hide_emitters`: cameras see past area lights, and no environment.
     pub hide_emitters: bool,
-    /// blake3 of the tree and of every file that it names, in hex: what provenance compares.
+    /// [`hash::content`]: what provenance compares.
     pub hash: String,
     /// The file that was loaded.
     pub path: PathBuf,

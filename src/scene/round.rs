@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3};
 use std::f64::consts::{PI, TAU};
 
 /// Kinds of round shapes, each in a space of its own. The texture coordinates are Mitsuba's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub enum RoundKind {
     /// Radius 1 about the origin; u = longitude from +X over a full turn, v = polar angle from +Z over a half.
     Sphere,
@@ -22,7 +22,7 @@ pub enum RoundKind {
 }
 
 /// A round shape of the scene.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Round {
     /// What it is.
     pub kind: RoundKind,

@@ -1,4 +1,4 @@
-//! The files that a scene names: each is read once, all in parallel, and hashed.
+//! The files that a scene names: each is read once, all in parallel.
 
 use super::params::Ids;
 use super::tree::{Kind, Node, Param, Value};
@@ -29,7 +29,6 @@ enum Content {
 /// Meshes and images by file.
 pub struct Assets {
     contents: BTreeMap<(PathBuf, Use), Content>,
-    hashes: BTreeMap<PathBuf, blake3::Hash>,
     warnings: Vec<String>,
 }
 
@@ -42,15 +41,11 @@ impl Assets {
                 uses.extend(use_of(node).map(|u| (file.to_owned(), u)));
             }
         });
-        let mut files: Vec<PathBuf> = uses.iter().map(|(f, _)| f.clone()).collect();
         first_of_each(&mut uses);
-        first_of_each(&mut files);
         let read_all: Vec<_> = uses.par_iter().map(|(file, u)| read(file, *u, allow_truncated)).collect();
         let (contents, odd): (Vec<_>, Vec<_>) = Error::gather(read_all)?.into_iter().unzip();
         let warnings = odd.into_iter().flatten().collect();
-        let hashes: Vec<Result<blake3::Hash>> = files.par_iter().map(|f| hash(f)).collect();
-        let hashes = hashes.into_iter().collect::<Result<Vec<_>>>()?;
-        Ok(Self { contents: uses.into_iter().zip(contents).collect(), hashes: files.into_iter().zip(hashes).collect(), warnings })
+        Ok(Self { contents: uses.into_iter().zip(contents).collect(), warnings })
     }
 
     /// What was odd about the files, but no error.
@@ -80,11 +75,6 @@ impl Assets {
             Content::Image(image) => Ok(image.clone()),
             Content::Mesh(..) => Err(node.at.error("found a mesh, expected an image")),
         }
-    }
-
-    /// The hash of a file's bytes.
-    pub fn hash(&self, file: &Path) -> Option<&blake3::Hash> {
-        self.hashes.get(file)
     }
 
     fn content(&self, node: &Node) -> Result<&Content> {
@@ -166,13 +156,6 @@ fn read(file: &Path, what: Use, allow_truncated: bool) -> Result<(Content, Vec<S
             (Content::Image(Arc::new(image)), odd)
         }
     })
-}
-
-fn hash(file: &Path) -> Result<blake3::Hash> {
-    let mut hasher = blake3::Hasher::new();
-    let opened = std::fs::File::open(file).map_err(|e| Error::io(file, e))?;
-    hasher.update_reader(opened).map_err(|e| Error::io(file, e))?;
-    Ok(hasher.finalize())
 }
 
 /// Leaves out repetitions; what remains stays in order.

@@ -2,7 +2,6 @@
 
 pub mod assets;
 pub mod document;
-pub mod hash;
 pub mod ior;
 pub mod json;
 pub mod load;

@@ -6,7 +6,7 @@ use crate::material::{Opacity, Texture};
 use glam::{Vec2, Vec3};
 
 /// A linear mix.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Blend {
     /// Share of `b`; clamped to [0, 1].
     pub weight: Texture,

@@ -13,7 +13,7 @@ use crate::material::Texture;
 use glam::{Vec2, Vec3};
 
 /// A height field that tilts the frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct BumpMap {
     /// Height, in scene units over `scale`.
     pub texture: Texture,
@@ -24,7 +24,7 @@ pub struct BumpMap {
 }
 
 /// A normal map.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct NormalMap {
     /// Tangent-space normals, stored as (n + 1) / 2, read `raw`.
     pub texture: Texture,

@@ -8,7 +8,7 @@ use crate::material::Texture;
 use glam::{Vec2, Vec3};
 
 /// A smooth metal.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Conductor {
     /// Real part of the index of refraction, over that of the outside. Zero: a perfect mirror (`none`).
     pub eta: Rgb,
@@ -47,7 +47,7 @@ impl Scatter for Conductor {
 }
 
 /// A rough metal.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct RoughConductor {
     /// The metal.
     pub metal: Conductor,

@@ -7,7 +7,7 @@ use crate::material::Texture;
 use glam::{Vec2, Vec3};
 
 /// What the dielectrics share in a scene file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct DielectricParams {
     /// Index of refraction of the inside. Mitsuba: bk7, 1.5046.
     pub int_ior: f32,
@@ -27,7 +27,7 @@ impl DielectricParams {
 }
 
 /// A smooth interface between two media.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Dielectric {
     /// Parameters as given.
     pub params: DielectricParams,
@@ -79,7 +79,7 @@ impl Scatter for Dielectric {
 }
 
 /// A thin sheet: light passes straight through.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct ThinDielectric {
     /// Parameters as given.
     pub params: DielectricParams,

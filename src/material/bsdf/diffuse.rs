@@ -7,7 +7,7 @@ use crate::material::Texture;
 use glam::{Vec2, Vec3};
 
 /// A Lambertian reflector, black from behind.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Diffuse {
     /// Albedo.
     pub reflectance: Texture,

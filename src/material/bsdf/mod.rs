@@ -147,7 +147,7 @@ fn positive_ratio(model: &str, inside: f32, outside: f32) -> Result<f32> {
 }
 
 /// A scattering model with its parameters.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub enum Bsdf {
     /// Lambertian.
     Diffuse(Diffuse),

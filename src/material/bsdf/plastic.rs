@@ -8,7 +8,7 @@ use crate::material::Texture;
 use glam::{Vec2, Vec3};
 
 /// What `plastic` and `roughplastic` share in a scene file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct PlasticParams {
     /// Index of refraction of the inside. Mitsuba: polypropylene, 1.49.
     pub int_ior: f32,
@@ -55,7 +55,7 @@ impl Colours {
 }
 
 /// The model, with what its parameters imply.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Plastic {
     /// Parameters as given.
     pub params: PlasticParams,

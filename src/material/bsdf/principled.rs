@@ -24,7 +24,7 @@ const CLEARCOAT_SHADOWING_ALPHA: f32 = 0.25;
 const CLEARCOAT_F0: f32 = 0.04;
 
 /// Parameters as in a scene file; all but `eta` and `base_color` lie in [0, 1].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct PrincipledParams {
     /// Colour. Mitsuba: 0.5.
     pub base_color: Texture,
@@ -73,7 +73,7 @@ impl Default for PrincipledParams {
 }
 
 /// The model.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Principled {
     /// Parameters as given, `eta` kept off 1 where light passes through.
     pub params: PrincipledParams,

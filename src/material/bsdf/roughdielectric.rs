@@ -9,7 +9,7 @@ use crate::material::Texture;
 use glam::{Vec2, Vec3};
 
 /// The model.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct RoughDielectric {
     /// Parameters as given.
     pub params: DielectricParams,

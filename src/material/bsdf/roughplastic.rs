@@ -20,7 +20,7 @@ const EXTERNAL_NODES: usize = 32;
 const INTERNAL_NODES: usize = 24;
 
 /// The model, with its tables of transmittance.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct RoughPlastic {
     /// Parameters as given.
     pub params: PlasticParams,
@@ -29,6 +29,7 @@ pub struct RoughPlastic {
     /// Microfacet family.
     pub distribution: Distribution,
     pub(crate) eta: f32,
+    #[serde(skip)]
     pub(crate) transmittance: [f32; COSINES],
     pub(crate) internal_reflectance: f32,
     /// 2 ∫ transmittance cos dcos.

@@ -6,7 +6,7 @@ use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 
 /// Different models in front and behind.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct TwoSided {
     /// Seen where cos > 0.
     pub front: Box<Bsdf>,

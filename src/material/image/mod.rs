@@ -26,6 +26,18 @@ pub(crate) enum Pixels {
     },
 }
 
+/// As the hash of its content, which is what a scene's hash asks for.
+impl serde::Serialize for Image {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let mut hasher = blake3::Hasher::new();
+        match &self.pixels {
+            Pixels::Float(pixels) => hasher.update(bytemuck::cast_slice(pixels)),
+            Pixels::Bytes { rgb, linear } => hasher.update(rgb).update(bytemuck::cast_slice(&linear[..])),
+        };
+        (self.width as u64, self.height as u64, hasher.finalize().as_bytes()).serialize(serializer)
+    }
+}
+
 impl Image {
     /// An image of width x height pixels, rows from the top.
     ///

@@ -13,8 +13,8 @@ mod texture;
 use super::assets::{Assets, ids, walk};
 use super::params::{Ids, Params};
 use super::tree::{Kind, Node, Param, Parsed, Value};
-use super::{hash, json, xml};
-use crate::scene::Scene;
+use super::{json, xml};
+use crate::scene::{Scene, hash};
 use crate::{Error, Result};
 use attribute::Current;
 use glam::DMat4;
@@ -52,14 +52,13 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let ids = ids(&children)?;
     let assets = Assets::load(&children, options.allow_truncated)?;
     warnings.extend_from_slice(assets.warnings());
-    let hash = hash::scene(&children, &ids, &assets, options.unit_scale);
     let mut builder = Builder {
         ids: &ids,
         children: &children,
         assets: &assets,
         unit_scale: options.unit_scale,
         skip_unsupported: options.skip_unsupported,
-        scene: Scene { hash, path: path.to_owned(), warnings, ..Scene::default() },
+        scene: Scene { path: path.to_owned(), warnings, ..Scene::default() },
         materials: BTreeMap::new(),
         default_material: None,
         lamp_material: None,
@@ -98,6 +97,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     if scene.emitters.is_empty() {
         scene.warnings.push(format!("{}: the scene has no emitter, so every image of it is black", path.display()));
     }
+    scene.hash = hash::content(&scene)?;
     Ok(scene)
 }
 
