@@ -1,9 +1,10 @@
 //! Nanoseconds of one thread for a BSDF's sample and its value with density: `cargo bench --bench bsdf`.
 
 use glam::{Vec2, Vec3};
-use reprobe::scene::load::{LoadOptions, load};
-use reprobe::transport::bsdf::Query;
-use reprobe::transport::{Ray, Sampler, World};
+use reprobe::base::ray::Ray;
+use reprobe::exchange::{LoadOptions, load};
+use reprobe::material::bsdf::Query;
+use reprobe::transport::{Sampler, World};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -1,8 +1,8 @@
 //! Seconds that the curvature of a scene takes: `cargo bench --bench curvature -- SCENE...` (default: scenes/room/scene.xml).
 //! The aim: a scene of a million triangles in 10 s on 2 cores.
 
-use reprobe::progress::Silent;
-use reprobe::scene::load::LoadOptions;
+use reprobe::base::progress::Silent;
+use reprobe::exchange::LoadOptions;
 use reprobe::surface::{CurvatureParams, curvature};
 use std::hint::black_box;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn main() {
         scenes.push("scenes/room/scene.xml".into());
     }
     for path in &scenes {
-        let scene = reprobe::scene::load(Path::new(path), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let scene = reprobe::exchange::load(Path::new(path), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let mut seconds: Vec<f64> = (0..5)
             .map(|_| {
                 let start = Instant::now();

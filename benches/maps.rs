@@ -4,10 +4,11 @@
 mod timing;
 
 use glam::Vec3;
-use reprobe::probe::qhmap::{ParameterMap, QhmapParams};
-use reprobe::probe::quasi_harmonic::Solver;
-use reprobe::probe::resmap::{ResmapParams, resolution_map};
-use reprobe::probe::seen::{Seen, SeenBuffers};
+use reprobe::method::glossy_probes::qhmap::QhmapParams;
+use reprobe::method::glossy_probes::quasi_harmonic::Solver;
+use reprobe::method::glossy_probes::resmap::{ResmapParams, resolution_map};
+use reprobe::method::glossy_probes::seen::{Seen, SeenBuffers};
+use reprobe::probe::parameter_map::ParameterMap;
 use timing::time;
 
 /// A bumpy ball of glossy stuff below, diffuse stuff above.

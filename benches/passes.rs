@@ -5,16 +5,16 @@
 
 mod timing;
 
+use reprobe::method::glossy_probes::candidates::NearCandidates;
+use reprobe::method::glossy_probes::filter::FilterParams;
+use reprobe::method::glossy_probes::gather::{GatherParams, gather};
+use reprobe::method::glossy_probes::renderer::{filter_pass, nearest_probes};
 use reprobe::probe::store::ProbeStore;
-use reprobe::render::candidates::NearCandidates;
-use reprobe::render::filter::FilterParams;
-use reprobe::render::gather::{GatherParams, gather};
-use reprobe::render::gbuffer::gbuffer;
-use reprobe::render::glossy_probes::{filter_pass, nearest_probes};
-use reprobe::render::mirror::mirror_pass;
 use reprobe::scene::Camera;
 use reprobe::surface::curvature_file;
 use reprobe::transport::World;
+use reprobe::view::gbuffer::gbuffer;
+use reprobe::view::mirror::mirror_pass;
 use std::path::Path;
 use timing::time;
 
@@ -28,7 +28,7 @@ fn main() {
     };
     let size =
         rest.first().and_then(|s| s.split_once('x')).map_or([1920, 1080], |(w, h)| [w, h].map(|n| n.parse().expect("WxH")));
-    let scene = reprobe::scene::load(Path::new(scene), &Default::default()).expect("a scene");
+    let scene = reprobe::exchange::load(Path::new(scene), &Default::default()).expect("a scene");
     let (world, _) = World::opaque(scene);
     let curvature = curvature_file::read(Path::new(curvature), world.scene.geometry.positions.len(), &world.scene.hash);
     let curvature = curvature.expect("curvatures of this scene");

@@ -6,10 +6,11 @@
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use reprobe::math::{Frame, hash_words, unit};
+use reprobe::base::math::{Frame, hash_words, unit};
+use reprobe::base::ray::Ray;
 use reprobe::scene::Scene;
+use reprobe::transport::World;
 use reprobe::transport::light_tree::Receiver;
-use reprobe::transport::{Ray, World};
 use std::path::Path;
 use std::time::Instant;
 
@@ -122,7 +123,7 @@ fn main() {
         println!("rays: no scene given, nothing measured");
     }
     for path in scenes {
-        let mut scene = reprobe::scene::load(Path::new(&path), &Default::default()).expect("a scene");
+        let mut scene = reprobe::exchange::load(Path::new(&path), &Default::default()).expect("a scene");
         scene.materials.iter_mut().for_each(|m| m.opacity = None);
         let start = Instant::now();
         let world = World::new(scene);

@@ -5,9 +5,9 @@
 
 use glam::{Vec2, Vec3};
 use image::{GrayImage, Luma, Rgb as Pixel, RgbImage};
-use reprobe::math::hash_words;
-use reprobe::render::filter::{FilterInput, FilterParams, Kernel, Method, filter};
-use reprobe::render::footprint::{Footprint, FootprintParams, ggx};
+use reprobe::base::math::hash_words;
+use reprobe::method::glossy_probes::filter::{FilterInput, FilterParams, Kernel, Method, filter};
+use reprobe::method::glossy_probes::footprint::{Footprint, FootprintParams, ggx};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

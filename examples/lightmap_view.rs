@@ -3,11 +3,11 @@
 
 use glam::Vec2;
 use rayon::prelude::*;
+use reprobe::base::math::{Rgb, hash_words};
+use reprobe::exchange::LoadOptions;
 use reprobe::io::ExrImage;
 use reprobe::lightmap::LightMap;
-use reprobe::math::{Rgb, hash_words};
-use reprobe::scene::load::LoadOptions;
-use reprobe::transport::bsdf::{Lobes, Query};
+use reprobe::material::bsdf::{Lobes, Query};
 use reprobe::transport::path::{PathParams, scattered};
 use reprobe::transport::{Sampler, World};
 use std::path::Path;
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let size = [w.parse()?, h.parse()?];
     let spp: u32 = spp.parse()?;
     let began = std::time::Instant::now();
-    let (world, _) = World::opaque(reprobe::scene::load(Path::new(scene), &LoadOptions::default())?);
+    let (world, _) = World::opaque(reprobe::exchange::load(Path::new(scene), &LoadOptions::default())?);
     eprintln!("scene {:.1} s", began.elapsed().as_secs_f32());
     let began = std::time::Instant::now();
     let map = LightMap::load(Path::new(map), &world.scene)?;

@@ -1,6 +1,7 @@
 //! Prints what a scene file holds: `cargo run --example scene_summary -- SCENE.xml`.
 
-use reprobe::scene::{Emitter, load, load::LoadOptions};
+use reprobe::exchange::{LoadOptions, load};
+use reprobe::scene::Emitter;
 
 fn main() {
     for path in std::env::args().skip(1) {

@@ -1,22 +1,22 @@
 //! The methods that glossy probes are compared with, where what they should show is known in closed form.
 
 use glam::Vec3;
+use reprobe::base::math::{Rgb, hash_words, luminance, unit};
+use reprobe::exchange::{LoadOptions, load};
 use reprobe::lightmap::lookup::sides;
 use reprobe::lightmap::{Atlas, AtlasParams, LightMap};
-use reprobe::math::{Rgb, hash_words, luminance, unit};
-use reprobe::probe::bake::probe_geometry;
+use reprobe::method::glossy_probes::bake::probe_geometry;
+use reprobe::method::image_space_gather::{ImageSpaceGatherParams, gather_image, mirror_image};
+use reprobe::method::lightmap_rt::{LightmapRtParams, lightmap_rt};
+use reprobe::method::path_trace::denoise::{DenoiseParams, Guide, denoise};
+use reprobe::method::ulr::{UlrParams, ulr};
 use reprobe::probe::file::{NO_TRIANGLE, Probe};
-use reprobe::probe::qhmap::ParameterMap;
-use reprobe::render::baseline::denoise::{DenoiseParams, Guide, denoise};
-use reprobe::render::baseline::image_space_gather::{ImageSpaceGatherParams, gather_image, mirror_image};
-use reprobe::render::baseline::lightmap_rt::{LightmapRtParams, lightmap_rt};
-use reprobe::render::baseline::ulr::{UlrParams, ulr};
-use reprobe::render::gbuffer::{GBuffer, gbuffer};
-use reprobe::render::path_trace::LayerImages;
-use reprobe::scene::load::{LoadOptions, load};
+use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::scene::{Camera, Scene};
 use reprobe::surface::CurvatureMap;
 use reprobe::transport::World;
+use reprobe::view::gbuffer::{GBuffer, gbuffer};
+use reprobe::view::layers::LayerImages;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -69,8 +69,8 @@ impl Setup {
     }
 
     /// Which wall a ray meets, and what it sends back.
-    fn wall_along(&self, pixel: &reprobe::render::gbuffer::Pixel) -> Rgb {
-        let d = reprobe::math::reflect(pixel.wo, pixel.normal);
+    fn wall_along(&self, pixel: &reprobe::view::gbuffer::Pixel) -> Rgb {
+        let d = reprobe::base::math::reflect(pixel.wo, pixel.normal);
         let hit = self.world.intersect(&pixel.surface.spawn(d)).unwrap();
         Rgb::from(GLOW[hit.object as usize]) + 0.5
     }
@@ -192,7 +192,7 @@ fn painted(world: &World, position: Vec3) -> Arc<Probe> {
     for texel in &mut probe.texels {
         if texel.triangle != NO_TRIANGLE {
             let b = texel.barycentric();
-            let hit = reprobe::transport::Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y };
+            let hit = reprobe::base::ray::Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y };
             let s = world.surface(&hit);
             texel.set_glossy(paint(s.p, s.object));
         }

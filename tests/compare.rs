@@ -1,7 +1,7 @@
 //! `compare` from the command line: numbers against scikit-image's, the report's files, exit codes, bad input.
 
+use reprobe::base::math::Rgb;
 use reprobe::io::ExrImage;
-use reprobe::math::Rgb;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

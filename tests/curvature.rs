@@ -1,8 +1,8 @@
 //! Curvature against surfaces whose curvature is known, and the file it travels in.
 
 use glam::{Mat3, Vec2, Vec3};
+use reprobe::base::progress::Silent;
 use reprobe::io::Provenance;
-use reprobe::progress::Silent;
 use reprobe::scene::{Geometry, Object};
 use reprobe::surface::{CurvatureMap, CurvatureParams, curvature, curvature_file};
 use std::f32::consts::{PI, TAU};

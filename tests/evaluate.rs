@@ -1,7 +1,7 @@
 //! `evaluate` from the command line: what it bakes, keeps, measures and refuses.
 
+use reprobe::base::math::Rgb;
 use reprobe::io::ExrImage;
-use reprobe::math::Rgb;
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::{Command, Output};

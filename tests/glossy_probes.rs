@@ -1,26 +1,26 @@
 //! The probe stages together, on a room whose reflections are known in closed form.
 
 use glam::{Vec2, Vec3};
+use reprobe::base::math::reflect;
+use reprobe::base::progress::Silent;
+use reprobe::exchange::{LoadOptions, load};
 use reprobe::io::Provenance;
 use reprobe::lightmap::lookup::sides;
 use reprobe::lightmap::{Atlas, AtlasParams};
-use reprobe::math::reflect;
-use reprobe::probe::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
+use reprobe::method::glossy_probes::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
+use reprobe::method::glossy_probes::candidates::Candidates;
+use reprobe::method::glossy_probes::coverage::{CoverageParams, SubPixels, covered_pixels};
+use reprobe::method::glossy_probes::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
+use reprobe::method::glossy_probes::perturb::Order;
 use reprobe::probe::file::{Probe, Texel};
-use reprobe::probe::qhmap::ParameterMap;
-use reprobe::progress::Silent;
-use reprobe::render::candidates::Candidates;
-use reprobe::render::composite::downsample;
-use reprobe::render::coverage::{CoverageParams, SubPixels, covered_pixels};
-use reprobe::render::gather::{GatherParams, Gathered, SearchLevel, WeightedProbe, gather};
-use reprobe::render::gbuffer::{GBuffer, Pixel, gbuffer};
-use reprobe::render::mirror::{Reflected, mirror_hit, mirror_pass};
-use reprobe::render::mirror_light::{add_mirrored, mirror_light_pass};
-use reprobe::render::perturb::Order;
-use reprobe::scene::load::{LoadOptions, load};
+use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::scene::{Camera, Scene};
 use reprobe::surface::{CurvatureMap, CurvatureParams, curvature};
 use reprobe::transport::World;
+use reprobe::view::composite::downsample;
+use reprobe::view::gbuffer::{GBuffer, Pixel, gbuffer};
+use reprobe::view::mirror::{Reflected, mirror_hit, mirror_pass};
+use reprobe::view::mirror_light::{add_mirrored, mirror_light_pass};
 
 /// A wall of a room from -2 to 2 in x and y and 0 to 4 in z, as Mitsuba's rectangle turned and moved, glowing in its own colour.
 fn wall(reflectance: &str, rotate: &str, translate: &str, radiance: &str) -> String {
@@ -84,7 +84,7 @@ impl Setup {
     fn view(&self, origin: Vec3, target: Vec3) -> (GBuffer, Vec<Reflected>) {
         let camera = Camera::look_at(origin, target, Vec3::Y, 1.0, [64, 48]);
         let view = gbuffer(&self.world, &self.curvature, &camera);
-        let mirror = |p: &reprobe::render::gbuffer::Pixel| mirror_hit(&self.world, &p.surface, p.wo);
+        let mirror = |p: &reprobe::view::gbuffer::Pixel| mirror_hit(&self.world, &p.surface, p.wo);
         let reflected =
             view.pixels.iter().map(|p| p.as_ref().filter(|p| p.alpha.is_some()).map_or(Reflected::NONE, mirror)).collect();
         (view, reflected)

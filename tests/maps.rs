@@ -1,10 +1,10 @@
 //! Resolution map and parameterisation of a probe in a synthetic room: the physics of §4.2.
 
 use glam::{Vec2, Vec3};
-use reprobe::probe::qhmap::{ParameterMap, count_flipped};
-use reprobe::probe::quasi_harmonic::Solver;
-use reprobe::probe::resmap::{ResmapParams, ResolutionMap, density_correlation, resolution_map, size_term};
-use reprobe::probe::seen::{Seen, SeenBuffers};
+use reprobe::method::glossy_probes::quasi_harmonic::Solver;
+use reprobe::method::glossy_probes::resmap::{ResmapParams, ResolutionMap, density_correlation, resolution_map, size_term};
+use reprobe::method::glossy_probes::seen::{Seen, SeenBuffers};
+use reprobe::probe::parameter_map::{ParameterMap, count_flipped};
 use std::f32::consts::{PI, TAU};
 
 /// A box seen from inside, with balls in it.
@@ -182,7 +182,7 @@ fn turning_the_scene_about_up_rolls_the_map() {
 #[test]
 fn texel_density_follows_m_over_a_room() {
     let map = Room::bathroom().map();
-    let epsilon = reprobe::probe::qhmap::QhmapParams::default().epsilon;
+    let epsilon = reprobe::method::glossy_probes::qhmap::QhmapParams::default().epsilon;
     let forward = Solver::new(map.size).unwrap().forward_map(&map.m, epsilon).unwrap();
     assert_eq!(count_flipped(map.size, &forward.vertices), 0);
     assert_eq!(forward.epsilon, epsilon);

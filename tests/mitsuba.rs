@@ -4,13 +4,14 @@
 //! `scripts/mitsuba_reference.py scenes/room/scene.xml -o DIR --size 32x18 --spp 16384 --max-depth -1`.
 
 use glam::DVec3;
+use reprobe::base::math::Rgb;
+use reprobe::base::progress::Silent;
+use reprobe::exchange::{LoadOptions, load};
 use reprobe::io::ExrImage;
-use reprobe::math::Rgb;
-use reprobe::progress::Silent;
-use reprobe::render::path_trace::{LayerImages, PathTraceParams, path_trace};
-use reprobe::scene::load::{LoadOptions, load};
+use reprobe::method::path_trace::{PathTraceParams, path_trace};
 use reprobe::transport::World;
 use reprobe::transport::path::PathParams;
+use reprobe::view::layers::LayerImages;
 use std::path::Path;
 
 const BATCHES: u32 = 24;

@@ -3,17 +3,19 @@
 mod room;
 
 use glam::{Affine3A, Vec2, Vec3};
-use reprobe::math::Rgb;
-use reprobe::progress::Silent;
-use reprobe::render::path_trace::{PathTraceParams, path_trace};
-use reprobe::scene::{Camera, Emitter, Texture};
-use reprobe::transport::bsdf::{
+use reprobe::base::math::Rgb;
+use reprobe::base::progress::Silent;
+use reprobe::base::ray::Ray;
+use reprobe::material::bsdf::{
     Bsdf, Conductor, Diffuse, Distribution, Lobes, PlasticParams, Query, RoughConductor, RoughPlastic,
 };
+use reprobe::material::{Surface, Texture};
+use reprobe::method::path_trace::{PathTraceParams, path_trace};
+use reprobe::scene::{Camera, Emitter};
 use reprobe::transport::light_tree::Receiver;
 use reprobe::transport::lights::Lights;
 use reprobe::transport::path::{PathParams, radiance, scattered, trace_layers, transmitted_irradiance};
-use reprobe::transport::{Ray, Sampler, Surface, World};
+use reprobe::transport::{Sampler, World};
 use room::Room;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
@@ -27,7 +29,7 @@ struct Estimate {
 fn estimate(n: u32, seed: u32, mut f: impl FnMut(&mut Sampler) -> Rgb) -> Estimate {
     const BATCHES: u32 = 64;
     let per_batch = n / BATCHES;
-    let batch = |b| (0..per_batch).map(|i| f(&mut Sampler::new(reprobe::math::hash_words(&[seed, b]), i))).sum::<Rgb>();
+    let batch = |b| (0..per_batch).map(|i| f(&mut Sampler::new(reprobe::base::math::hash_words(&[seed, b]), i))).sum::<Rgb>();
     let means: Vec<Rgb> = (0..BATCHES).map(batch).map(|sum| sum / per_batch as f32).collect();
     let mean = means.iter().sum::<Rgb>() / BATCHES as f32;
     let variance = means.iter().map(|m| (*m - mean) * (*m - mean)).sum::<Rgb>() / (BATCHES * (BATCHES - 1)) as f32;
@@ -311,7 +313,7 @@ fn a_turned_sky_lights_from_where_it_is_seen() {
     // Upper half bright, turned so that its zenith is +X: a wall facing +X gets it all, one facing -X the dark half.
     let rows = 64;
     let pixel = |y: usize| if y < rows / 2 { Rgb::splat(2.0) } else { Rgb::ZERO };
-    let image = reprobe::scene::image::Image::new(4, rows, (0..4 * rows).map(|i| pixel(i / 4)).collect());
+    let image = reprobe::material::image::Image::new(4, rows, (0..4 * rows).map(|i| pixel(i / 4)).collect());
     let image = std::sync::Arc::new(image);
     let to_world = Affine3A::from_rotation_z(-std::f32::consts::FRAC_PI_2);
     for (side, expected) in [(1.0, 1.0), (-1.0, 0.0)] {

@@ -1,11 +1,11 @@
 //! place-probes, resmap and qhmap as commands, on a small scene.
 
 use glam::Vec3;
+use reprobe::exchange::load;
+use reprobe::method::glossy_probes::seen::SeenBuffers;
+use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::probe::placement::{Density, ProbeGrid};
-use reprobe::probe::qhmap::ParameterMap;
 use reprobe::probe::reach::{ReachParams, blocked, reach};
-use reprobe::probe::seen::SeenBuffers;
-use reprobe::scene::load;
 use reprobe::transport::World;
 use std::path::Path;
 use std::process::Command;

@@ -1,10 +1,11 @@
 //! Scene files: what they mean in each dialect, and what a bad one is told.
 
 use glam::{Vec2, Vec3};
-use reprobe::scene::load::LoadOptions;
-use reprobe::scene::{Emitter, Scene, Texture, load};
+use reprobe::exchange::{LoadOptions, load};
+use reprobe::material::Texture;
+use reprobe::material::bsdf::Bsdf;
+use reprobe::scene::{Emitter, Scene};
 use reprobe::transport::World;
-use reprobe::transport::bsdf::Bsdf;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 /// `Camera` of camera.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct GpuCamera {
+pub(crate) struct GpuCamera {
     x: [f32; 3],
     focal_px: f32,
     y: [f32; 3],
@@ -39,9 +39,9 @@ impl From<&Camera> for GpuCamera {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kernel::shader;
-    use super::super::layout::check;
     use super::*;
+    use crate::gpu::kernel::shader;
+    use crate::gpu::layout::check;
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {

@@ -9,7 +9,7 @@ use std::time::Instant;
 const MOST_TIMED: u32 = 2048;
 
 /// Runs of kernels, each handed to the device at once: none is long enough for a driver to take the device for hung.
-pub(super) struct Commands<'a> {
+pub(crate) struct Commands<'a> {
     gpu: &'a Gpu,
     /// Two a run; `None` where the device has no clock.
     queries: Option<wgpu::QuerySet>,
@@ -18,7 +18,7 @@ pub(super) struct Commands<'a> {
 }
 
 impl<'a> Commands<'a> {
-    pub(super) fn new(gpu: &'a Gpu) -> Self {
+    pub(crate) fn new(gpu: &'a Gpu) -> Self {
         let queries = gpu.adapter.timestamps.then(|| {
             let (label, ty, count) = (Some("times"), wgpu::QueryType::Timestamp, 2 * MOST_TIMED);
             gpu.device.create_query_set(&wgpu::QuerySetDescriptor { label, ty, count })
@@ -27,12 +27,12 @@ impl<'a> Commands<'a> {
     }
 
     /// Runs that are waited for and timed by the host, as those are whose length is learnt on the way.
-    pub(super) fn by_host(gpu: &'a Gpu) -> Self {
+    pub(crate) fn by_host(gpu: &'a Gpu) -> Self {
         Self { gpu, queries: None, runs: Vec::new() }
     }
 
     /// Runs a kernel on `groups` workgroups, as part of `pass`.
-    pub(super) fn run(&mut self, pass: &'static str, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 2]) {
+    pub(crate) fn run(&mut self, pass: &'static str, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 2]) {
         let number = self.runs.len() as u32;
         let timed = self.queries.as_ref().filter(|_| number < MOST_TIMED);
         let writes = timed.map(|query_set| wgpu::ComputePassTimestampWrites {
@@ -54,7 +54,7 @@ impl<'a> Commands<'a> {
     }
 
     /// Waits for the end. Milliseconds a pass, in order.
-    pub(super) fn finish(mut self) -> Result<Vec<(&'static str, f64)>> {
+    pub(crate) fn finish(mut self) -> Result<Vec<(&'static str, f64)>> {
         if let Some(queries) = &self.queries {
             let timed = (self.runs.len() as u32).min(MOST_TIMED);
             let ms_a_tick = f64::from(self.gpu.queue.get_timestamp_period()) * 1e-6;

@@ -111,8 +111,8 @@ pub fn adapters() -> Vec<Adapter> {
 pub struct Gpu {
     /// Its adapter.
     pub adapter: Adapter,
-    pub(super) device: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
     lost: Arc<Mutex<Option<String>>>,
 }
 
@@ -165,7 +165,7 @@ impl Gpu {
     }
 
     /// Does `work`, and makes an error of what goes wrong on the device meanwhile: a lack of memory, or a loss of the device.
-    pub(super) fn checked<T>(&self, work: impl FnOnce() -> T) -> Result<T> {
+    pub(crate) fn checked<T>(&self, work: impl FnOnce() -> T) -> Result<T> {
         let scopes = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory];
         let scopes = scopes.map(|filter| self.device.push_error_scope(filter));
         let result = work();
@@ -189,13 +189,13 @@ impl Gpu {
     }
 
     /// Waits until the device has done all that it was given.
-    pub(super) fn wait(&self) {
+    pub(crate) fn wait(&self) {
         // What fails here shows as a lost device.
         let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
     }
 
     /// An error where a kernel could not bind a buffer of `size` bytes.
-    pub(super) fn fits(&self, label: &str, size: u64) -> Result<()> {
+    pub(crate) fn fits(&self, label: &str, size: u64) -> Result<()> {
         let (limit, name) = (self.adapter.max_binding, &self.adapter.name);
         if size <= limit {
             return Ok(());
@@ -207,7 +207,7 @@ impl Gpu {
     }
 
     /// A buffer with `content`.
-    pub(super) fn upload(&self, label: &str, content: &[u8]) -> Result<wgpu::Buffer> {
+    pub(crate) fn upload(&self, label: &str, content: &[u8]) -> Result<wgpu::Buffer> {
         self.fits(label, content.len() as u64)?;
         self.checked(|| {
             use wgpu::util::DeviceExt;

@@ -5,14 +5,14 @@ use super::kernel::{Kernel, shader};
 use super::pace::Pace;
 use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
 use crate::Result;
-use crate::math::Rgb;
-use crate::transport::bsdf::{Lobes, Query};
+use crate::base::math::Rgb;
+use crate::material::bsdf::{Lobes, Query};
 use crate::transport::path::PathParams;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use std::sync::Arc;
 
-pub(super) const WORKGROUP: usize = 64;
+pub(crate) const WORKGROUP: usize = 64;
 
 /// `PathStart` of start.wgsl.
 #[repr(C)]
@@ -38,7 +38,7 @@ pub struct PathStart {
 
 /// What paths are followed for.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Purpose {
+pub(crate) enum Purpose {
     /// A half of the first vertex, or with a scale of 1 and all lobes the whole.
     Scattering(Query),
     /// The same by rays that follow the lobes alone: no emitter is sampled, and the last vertex sends none.
@@ -94,7 +94,7 @@ impl SampleSum {
 
 /// Where in its random stream a path begins.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(crate) struct Place {
     /// A branch of the stream.
     pub branch: Option<u32>,
     /// Sets of dimensions drawn before.
@@ -107,7 +107,7 @@ fn source() -> String {
 
 /// Follows paths through a scene.
 #[derive(Clone)]
-pub(super) struct Follow {
+pub(crate) struct Follow {
     scene: Arc<GpuScene>,
     kernel: Kernel,
     params: Params,
@@ -227,14 +227,14 @@ impl Follow {
 }
 
 /// Most starts a dispatch: WebGPU's most workgroups along a line, and what a kernel can bind.
-pub(super) fn most_starts(scene: &GpuScene) -> usize {
+pub(crate) fn most_starts(scene: &GpuScene) -> usize {
     (65_535 * WORKGROUP).min(scene.gpu.adapter.max_binding as usize / size_of::<PathStart>())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::check;
     use super::*;
+    use crate::gpu::layout::check;
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {

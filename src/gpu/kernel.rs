@@ -6,31 +6,31 @@ use crate::{Error, Result};
 use bytemuck::Pod;
 
 /// Pixels of a picture.
-pub(super) fn area([width, height]: [u32; 2]) -> u64 {
+pub(crate) fn area([width, height]: [u32; 2]) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
 /// Workgroups that cover a picture.
-pub(super) fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
+pub(crate) fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(workgroup[0]), size[1].div_ceil(workgroup[1])]
 }
 
 /// A compiled entry point. Its bindings are buffers of group 0, numbered from 0; group 1 is the scene, for kernels that follow its light.
 #[derive(Clone)]
-pub(super) struct Kernel {
+pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
     scene: Option<wgpu::BindGroup>,
 }
 
 impl Kernel {
     /// Compiles `source`; the name of its entry point names the kernel.
-    pub(super) fn new(gpu: &Gpu, source: &str, entry: &'static str) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, source: &str, entry: &'static str) -> Result<Self> {
         Ok(Self { pipeline: pipeline(gpu, (source, checked), entry, None, &[])?, scene: None })
     }
 
     /// A kernel in a scene, of `reads` buffers to read and then `writes` to write. `source` holds the files that `entry` needs; `constants`
     /// are its own overrides.
-    pub(super) fn in_scene(
+    pub(crate) fn in_scene(
         scene: &GpuScene,
         source: &str,
         entry: &'static str,
@@ -99,11 +99,11 @@ fn pipeline(
 macro_rules! shader {
     ($($name:literal),+) => { concat!($(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $name, ".wgsl"))),+) };
 }
-pub(super) use shader;
+pub(crate) use shader;
 
 impl Gpu {
     /// A buffer for kernels to write.
-    pub(super) fn output(&self, label: &'static str, size: u64) -> Result<wgpu::Buffer> {
+    pub(crate) fn output(&self, label: &'static str, size: u64) -> Result<wgpu::Buffer> {
         self.fits(label, size)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let (label, mapped_at_creation) = (Some(label), false);
@@ -111,14 +111,14 @@ impl Gpu {
     }
 
     /// Fills a buffer with zeros.
-    pub(super) fn clear(&self, buffer: &wgpu::Buffer) {
+    pub(crate) fn clear(&self, buffer: &wgpu::Buffer) {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         encoder.clear_buffer(buffer, 0, None);
         self.queue.submit([encoder.finish()]);
     }
 
     /// Buffers as the bindings of a group, numbered from 0.
-    pub(super) fn group(&self, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
+    pub(crate) fn group(&self, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
         let bindings = buffers.iter().enumerate();
         let entries: Vec<_> =
             bindings.map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() }).collect();
@@ -126,7 +126,7 @@ impl Gpu {
     }
 
     /// Hands a kernel's run on `groups` workgroups to the device.
-    pub(super) fn submit(
+    pub(crate) fn submit(
         &self,
         kernel: &Kernel,
         buffers: &[&wgpu::Buffer],
@@ -147,7 +147,7 @@ impl Gpu {
     }
 
     /// Runs a kernel on `groups` workgroups and waits for it.
-    pub(super) fn dispatch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 2]) -> Result<()> {
+    pub(crate) fn dispatch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 2]) -> Result<()> {
         self.checked(|| {
             self.submit(kernel, buffers, groups, None);
             self.wait();
@@ -155,7 +155,7 @@ impl Gpu {
     }
 
     /// What a buffer of [`Gpu::output`] holds.
-    pub(super) fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>> {
+    pub(crate) fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>> {
         let bytes = self.checked(|| {
             let back = self.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("read back"),

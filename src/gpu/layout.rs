@@ -4,7 +4,7 @@ use wgpu::naga::TypeInner;
 use wgpu::naga::front::wgsl::parse_str;
 
 /// Size of a shader's struct, and name and offset of its members.
-pub(super) fn layout(source: &str, name: &str) -> (usize, Vec<(String, usize)>) {
+pub(crate) fn layout(source: &str, name: &str) -> (usize, Vec<(String, usize)>) {
     let module = parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
     let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
     match found.map(|(_, t)| &t.inner) {
@@ -26,4 +26,4 @@ macro_rules! check {
         assert_eq!(named.map(|(n, o)| (n.as_str(), *o)).collect::<Vec<_>>(), expected, "members of {}", $name);
     }};
 }
-pub(super) use check;
+pub(crate) use check;

@@ -4,7 +4,7 @@ use super::follow::{Follow, PathStart, Place, Purpose};
 use super::pace::Pace;
 use super::scene::GpuScene;
 use crate::Result;
-use crate::math::Rgb;
+use crate::base::math::Rgb;
 use crate::transport::path::PathParams;
 use glam::Vec2;
 use rayon::prelude::*;

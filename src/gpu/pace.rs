@@ -7,7 +7,7 @@ const AIM: f64 = 0.15;
 
 /// Pieces of work a dispatch, learnt from those before.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pace {
+pub(crate) struct Pace {
     pieces: f64,
 }
 

@@ -3,7 +3,7 @@
 use super::kernel::Kernel;
 use super::scene::{GpuScene, RAYS};
 use crate::Result;
-use crate::transport::{Hit, Ray};
+use crate::base::ray::{Hit, Ray};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 

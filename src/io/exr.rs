@@ -62,7 +62,7 @@ impl ExrImage {
     }
 
     /// Adds `layer.R`, `layer.G`, `layer.B` (or plain `R`, `G`, `B` for an empty layer name).
-    pub fn with_rgb(mut self, layer: &str, pixels: &[crate::math::Rgb]) -> Self {
+    pub fn with_rgb(mut self, layer: &str, pixels: &[crate::base::math::Rgb]) -> Self {
         for (i, c) in ["R", "G", "B"].into_iter().enumerate() {
             let name = if layer.is_empty() { c.into() } else { format!("{layer}.{c}") };
             self.channels.push((name, Samples::F32(pixels.iter().map(|p| p[i]).collect())));
@@ -111,10 +111,10 @@ impl ExrImage {
     }
 
     /// Three channels `layer.R`, `layer.G`, `layer.B` (plain `R`, `G`, `B` for an empty layer name) as colours.
-    pub fn rgb(&self, path: &Path, layer: &str) -> Result<Vec<crate::math::Rgb>> {
+    pub fn rgb(&self, path: &Path, layer: &str) -> Result<Vec<crate::base::math::Rgb>> {
         let get = |c: &str| self.f32(path, &if layer.is_empty() { c.into() } else { format!("{layer}.{c}") });
         let (r, g, b) = (get("R")?, get("G")?, get("B")?);
-        Ok(r.into_iter().zip(g).zip(b).map(|((r, g), b)| crate::math::Rgb::new(r, g, b)).collect())
+        Ok(r.into_iter().zip(g).zip(b).map(|((r, g), b)| crate::base::math::Rgb::new(r, g, b)).collect())
     }
 
     /// The provenance, or an error that says that there is none.

@@ -1,7 +1,7 @@
 //! Pictures of EXR layers for people: colours as sRGB, vectors and scalars in false colours, indices in random ones.
 
 use super::{ExrImage, Samples};
-use crate::math::hash_words;
+use crate::base::math::hash_words;
 use std::collections::BTreeMap;
 
 /// A layer of an image as 8-bit RGB.

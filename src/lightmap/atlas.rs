@@ -4,7 +4,8 @@
 //! no lookup inside a chart's rectangle ever reads a texel of another. Charts are stretched to whole texels,
 //! so that the border of a rectangular wall is a border between texels.
 
-use super::adjacency::{self, Adjacency, NONE};
+use super::adjacency;
+use super::adjacency::{Adjacency, NONE};
 use super::chart::{Chart, charts_of};
 use super::pack::pack;
 use crate::scene::Geometry;
@@ -185,10 +186,10 @@ fn seams_of(adjacency: &Adjacency, triangle_chart: &[u32]) -> Vec<Seam> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lookup::sides;
-    use super::super::testing;
     use super::*;
-    use crate::math::Rgb;
+    use crate::base::math::Rgb;
+    use crate::lightmap::lookup::sides;
+    use crate::lightmap::testing;
     use glam::Vec3;
 
     fn build(geometry: &Geometry, texel: f32) -> Atlas {
@@ -291,14 +292,14 @@ mod tests {
         testing::sphere(&mut geometry, Vec3::ZERO, 1.0, 16);
         let atlas = build(&geometry, 0.11);
         // Each chart in a colour of its own, everything between charts glaring.
-        let texels = super::super::texels::Texels::new(&geometry, &atlas);
+        let texels = crate::lightmap::texels::Texels::new(&geometry, &atlas);
         let mut pixels = vec![Rgb::splat(1e6); (atlas.size[0] * atlas.size[1]) as usize];
         let mut valid = vec![false; pixels.len()];
         for i in 0..texels.len() {
             pixels[texels.pixel[i] as usize] = Rgb::splat(1.0 + texels.chart[i] as f32);
             valid[texels.pixel[i] as usize] = true;
         }
-        super::super::fill::dilate(&atlas, &mut pixels, &valid);
+        crate::lightmap::fill::dilate(&atlas, &mut pixels, &valid);
         let map = sides(&geometry, &atlas, pixels, None);
         for t in 0..geometry.triangles.len() as u32 {
             let expected = 1.0 + atlas.triangle_chart[t as usize] as f32;

@@ -3,12 +3,14 @@
 use super::bake::{BakeParams, Pass, Plan};
 use super::parts::{Memory, Store};
 use super::{AtlasParams, LightMap, testing};
-use crate::math::Rgb;
-use crate::progress::Silent;
-use crate::scene::{Camera, Emitter, Geometry, Material, Scene, Texture};
-use crate::transport::bsdf::{Bsdf, Conductor, Diffuse, TwoSided};
+use crate::base::math::Rgb;
+use crate::base::progress::Silent;
+use crate::base::ray::Ray;
+use crate::material::bsdf::{Bsdf, Conductor, Diffuse, TwoSided};
+use crate::material::{Material, Surface, Texture};
+use crate::scene::{Camera, Emitter, Geometry, Scene};
 use crate::transport::path::{PathParams, transmitted_irradiance};
-use crate::transport::{Ray, Sampler, Surface, World};
+use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 

@@ -1,14 +1,15 @@
-//! One texel's value: which samples of it count (see [`super::visible`]), the light at each, and what is made of them.
+//! One texel's value: which samples of it count (see [`crate::lightmap::visible`]), the light at each, and what is made of them.
 
 use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, Pass, Plan, SPLIT};
 use super::parts::Record;
 use super::visible::View;
 use crate::Result;
+use crate::base::math::{Rgb, hash_words};
+use crate::base::progress::Progress;
 use crate::gpu::{LightPaths, LightStart};
-use crate::math::{Rgb, hash_words};
-use crate::progress::Progress;
+use crate::material::Surface;
+use crate::transport::Sampler;
 use crate::transport::path::{KnownDiffuse, transmitted_irradiance};
-use crate::transport::{Sampler, Surface};
 use rayon::prelude::*;
 
 /// Most sample points tried for each one that counts, in a texel that is hidden in part.

@@ -1,7 +1,7 @@
 //! Gutters, and texels that no valid sample reached, take the mean of their valid neighbours, ring by ring.
 
 use super::atlas::{Atlas, GUTTER};
-use crate::math::Rgb;
+use crate::base::math::Rgb;
 use rayon::prelude::*;
 
 /// Grows valid values over each chart's rectangle until it is full. Charts without a valid texel stay black.

@@ -10,10 +10,10 @@
 
 use super::Atlas;
 use super::adjacency::NONE;
+use crate::base::math::Rgb;
 use crate::io::{ExrImage, Provenance};
-use crate::math::Rgb;
+use crate::material::Surface;
 use crate::scene::{Geometry, Scene};
-use crate::transport::Surface;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3, Vec4};
 use std::f32::consts::FRAC_1_PI;
@@ -159,8 +159,8 @@ fn decode(words: &[u32], geometry: &Geometry, size: [u32; 2]) -> std::result::Re
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AtlasParams, testing};
     use super::*;
+    use crate::lightmap::{AtlasParams, testing};
     use glam::Vec3;
 
     fn scene() -> Scene {

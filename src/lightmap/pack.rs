@@ -74,7 +74,7 @@ fn raise(skyline: &mut Vec<Step>, at: usize, new: Step) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash_words;
+    use crate::base::math::hash_words;
 
     #[test]
     fn rectangles_never_overlap_and_waste_little() {

@@ -6,7 +6,7 @@
 
 use super::atlas::{Atlas, GUTTER, Seam};
 use super::lookup::bilinear;
-use crate::math::{Rgb, luminance};
+use crate::base::math::{Rgb, luminance};
 use crate::scene::Geometry;
 use glam::Vec2;
 use std::collections::BTreeMap;
@@ -152,11 +152,11 @@ fn solve(rows: &[Row], keep: &[f32], start: &[Rgb]) -> Vec<Rgb> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lookup::sides;
-    use super::super::texels::Texels;
-    use super::super::{AtlasParams, fill, testing};
     use super::*;
-    use crate::math::hash_words;
+    use crate::base::math::hash_words;
+    use crate::lightmap::lookup::sides;
+    use crate::lightmap::texels::Texels;
+    use crate::lightmap::{AtlasParams, fill, testing};
     use glam::Vec3;
 
     /// A sphere lit by a smooth function of the normal, plus noise; mean and largest jump across its seams.

@@ -85,9 +85,9 @@ fn winding(geometry: &Geometry, triangles: &[u32], p: Vec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::adjacency::adjacency;
-    use super::super::testing;
     use super::*;
+    use crate::lightmap::adjacency::adjacency;
+    use crate::lightmap::testing;
 
     fn orientation(g: &Geometry, occupied: &[Vec3]) -> Orientation {
         let mut out = vec![0; g.triangles.len()];

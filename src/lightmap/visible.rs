@@ -8,11 +8,14 @@
 //! - the others fall into regions that can see each other just above the surface. Of several regions a texel keeps the
 //!   largest that gets any light, and of those one from which the sensor is seen in two segments, if there is one.
 
+use super::Atlas;
+use super::adjacency::NONE;
 use super::solid::Orientation;
 use super::texels::{Point, Texels};
-use super::{Atlas, adjacency::NONE};
-use crate::math::{Frame, hash_words};
-use crate::transport::{Hit, Ray, Sampler, Surface, World};
+use crate::base::math::{Frame, hash_words};
+use crate::base::ray::{Hit, Ray};
+use crate::material::Surface;
+use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
 use std::f32::consts::TAU;
 

@@ -32,7 +32,7 @@ pub fn magma(errors: &[f32]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rgb;
+    use crate::base::math::Rgb;
 
     #[test]
     fn black_against_white_is_the_largest_error() {

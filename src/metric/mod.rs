@@ -11,7 +11,7 @@ pub mod ssim;
 pub mod temporal;
 pub mod without_noise;
 
-use crate::math::Rgb;
+use crate::base::math::Rgb;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -78,7 +78,7 @@ pub fn display(image: &Raster, exposure: f32) -> Raster {
 /// The channels of an image, and its luminance.
 fn planes(r: &Raster) -> [Vec<f32>; 4] {
     let channel = |i: usize| r.pixels.iter().map(|p| p[i]).collect();
-    [channel(0), channel(1), channel(2), r.pixels.iter().map(|&p| crate::math::luminance(p)).collect()]
+    [channel(0), channel(1), channel(2), r.pixels.iter().map(|&p| crate::base::math::luminance(p)).collect()]
 }
 
 /// All metrics of `image` against `reference`, at 2^`exposure`. Both hold linear radiance, are of one size, and at least

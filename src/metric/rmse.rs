@@ -1,6 +1,6 @@
 //! Root mean square error and its relative cousin, summed in f64.
 
-use crate::math::Rgb;
+use crate::base::math::Rgb;
 
 /// What keeps the relative error of black reference pixels finite. Ours: a hundredth, as renderers commonly take.
 pub const REL_MSE_EPSILON: f64 = 1e-2;

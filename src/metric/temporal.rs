@@ -5,7 +5,7 @@
 //! new in every frame, counts in full, and that of the reference with it.
 
 use super::Raster;
-use crate::math::Rgb;
+use crate::base::math::Rgb;
 
 /// a - b of every pixel, of display values.
 pub fn signed_error([a, b]: &[Raster; 2]) -> Vec<Rgb> {
@@ -21,9 +21,9 @@ pub fn change(before: &[Rgb], after: &[Rgb]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::display;
     use super::*;
-    use crate::math::hash_words;
+    use crate::base::math::hash_words;
+    use crate::metric::display;
 
     const SIZE: [usize; 2] = [64, 48];
 

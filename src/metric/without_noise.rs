@@ -7,22 +7,22 @@
 //! is of second order in the noise.
 
 use super::{Raster, display, planes, rmse, ssim};
-use crate::math::{Rgb, luminance};
+use crate::base::math::{Rgb, luminance};
 use rayon::prelude::*;
 use serde::Serialize;
 
 /// The numbers of one frame, or their mean over frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct WithoutNoise {
-    /// [`super::Metrics::rmse_rgb`] without the reference's noise; 0 where chance takes its square below 0.
+    /// [`crate::metric::Metrics::rmse_rgb`] without the reference's noise; 0 where chance takes its square below 0.
     pub rmse_rgb: f64,
-    /// [`super::Metrics::rmse_lum`], likewise.
+    /// [`crate::metric::Metrics::rmse_lum`], likewise.
     pub rmse_lum: f64,
-    /// [`super::Metrics::dssim_rgb`], likewise.
+    /// [`crate::metric::Metrics::dssim_rgb`], likewise.
     pub dssim_rgb: f64,
-    /// [`super::Metrics::dssim_lum`], likewise.
+    /// [`crate::metric::Metrics::dssim_lum`], likewise.
     pub dssim_lum: f64,
-    /// The noise of one reference: [`super::Metrics::rmse_rgb`] between both, by the square root of two.
+    /// The noise of one reference: [`crate::metric::Metrics::rmse_rgb`] between both, by the square root of two.
     pub noise_rmse_rgb: f64,
 }
 
@@ -63,8 +63,8 @@ impl WithoutNoise {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Metrics, compare};
     use super::*;
+    use crate::metric::{Metrics, compare};
 
     const SIZE: [usize; 2] = [160, 120];
 

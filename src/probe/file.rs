@@ -4,10 +4,10 @@
 //! parameterisation with its derivative 8 at half resolution. [`Texel`] holds the first four, and 6 of our own for perfect mirrors;
 //! [`ParameterMap`] the rest.
 
-use super::qhmap::ParameterMap;
+use super::parameter_map::ParameterMap;
+use crate::base::math::{Rgb, floor};
 use crate::io::{ExrImage, Provenance};
-use crate::math::{Rgb, floor};
-use crate::render::mirror::{NOTHING, Reflected, SKY};
+use crate::view::mirror::{NOTHING, Reflected, SKY};
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 use half::f16;
@@ -34,7 +34,7 @@ pub struct Texel {
     pub reflected_material: u16,
     /// Barycentric weights of the reflector triangle's second and third vertex.
     pub barycentric: [f16; 2],
-    /// The part of `glossy` that [`crate::render::mirror_light`] finds, where the reflector is a perfect mirror.
+    /// The part of `glossy` that [`crate::view::mirror_light`] finds, where the reflector is a perfect mirror.
     pub mirrored: [f16; 3],
     /// The reflector's triangle or [`NO_TRIANGLE`].
     pub triangle: u32,
@@ -219,16 +219,16 @@ impl Probe {
 #[serde(deny_unknown_fields)]
 pub struct BakedSet {
     /// Where the probes stand.
-    pub grid: super::placement::ProbeGrid,
+    pub grid: crate::probe::placement::ProbeGrid,
     /// Width and height of a probe, texels.
     pub size: [u32; 2],
     /// What alpha was multiplied by at the first vertex (§6.1).
     pub roughness_scale: f32,
-    /// Whether texels that see a perfect mirror tell what of their radiance [`crate::render::mirror_light`] finds.
+    /// Whether texels that see a perfect mirror tell what of their radiance [`crate::view::mirror_light`] finds.
     #[serde(default)]
     pub mirrored: bool,
     /// The views that it serves; `None` serves any.
-    pub views: Option<super::wanted::Views>,
+    pub views: Option<crate::method::glossy_probes::wanted::Views>,
     /// blake3 of every probe's file, hex, by index; empty where the views do not use the probe.
     pub files: Vec<String>,
     /// Where the set came from.

@@ -2,9 +2,9 @@
 //! colours (§4.2.2, Fig. 4i).
 //!
 //! *Ours*: each quad is inverted exactly as the bilinear patch it is, not as two triangles, so that the inverse is that of
-//! [`super::qhmap::ParameterMap::forward_at`] to rounding, whichever way a diagonal would have run.
+//! [`crate::probe::parameter_map::ParameterMap::forward_at`] to rounding, whichever way a diagonal would have run.
 
-use super::qhmap::quads;
+use super::parameter_map::quads;
 use glam::{DVec2, Vec2};
 
 /// How far a texel's centre may lie outside a quad, in quad coordinates, and still count as in it: rounding alone.
@@ -18,7 +18,7 @@ pub struct InverseMap {
     pub derivative: Vec<Vec2>,
 }
 
-/// Inverts a mesh (see [`super::qhmap::ParameterMap`]) none of whose quads is flipped.
+/// Inverts a mesh (see [`crate::probe::parameter_map::ParameterMap`]) none of whose quads is flipped.
 pub fn invert(mesh: [u32; 2], forward: &[Vec2], size: [u32; 2]) -> InverseMap {
     let scale = DVec2::new(f64::from(size[0]), f64::from(size[1]));
     let quad_size = DVec2::new(f64::from(mesh[0]), f64::from(mesh[1])).recip();

@@ -247,7 +247,7 @@ mod tests {
     fn trilinear_weights_interpolate_linear_functions_exactly() {
         let grid = grid(Density::default());
         for i in 0..500 {
-            let r = |k: u32| crate::math::hash_words(&[i, k]) as f32 / u32::MAX as f32;
+            let r = |k: u32| crate::base::math::hash_words(&[i, k]) as f32 / u32::MAX as f32;
             let p = Vec3::new(-0.5, 0.25, 2.5) + Vec3::new(6.0, 2.5, 5.0) * Vec3::new(r(0), r(1), r(2));
             assert!((interpolated(&grid, p) - p).length() < 1e-5, "{p}");
         }
@@ -259,7 +259,8 @@ mod tests {
         let grid = grid(Density::default());
         let p = interpolated(&grid, Vec3::new(-50.0, 1.0, 90.0));
         assert!((p - Vec3::new(-0.5, 1.0, 7.5)).length() < 1e-5, "{p}");
-        let one = super::ProbeGrid::in_box(Vec3::ZERO, Vec3::ONE, Density::Counts([1, 2, 1]), grid.provenance).unwrap();
+        let one = crate::probe::placement::ProbeGrid::in_box(Vec3::ZERO, Vec3::ONE, Density::Counts([1, 2, 1]), grid.provenance)
+            .unwrap();
         let sum: f32 = one.around(Vec3::new(3.0, 0.4, -2.0)).iter().map(|w| w.weight).sum();
         assert!((sum - 1.0).abs() < 1e-6 && interpolated(&one, Vec3::splat(0.4)).abs_diff_eq(Vec3::new(0.5, 0.4, 0.5), 1e-5));
     }

@@ -5,8 +5,9 @@
 //! tails of the seen points' distribution are trimmed, so that a view out of a window does not draw the grid after it.
 
 use super::placement::ProbeGrid;
-use crate::math::direction_from_lat_long;
-use crate::transport::{Ray, World};
+use crate::base::math::direction_from_lat_long;
+use crate::base::ray::Ray;
+use crate::transport::World;
 use crate::{Error, Result};
 use glam::{IVec3, UVec3, Vec2, Vec3};
 use rayon::prelude::*;

@@ -1,8 +1,9 @@
 //! A folder of baked probes, read as they are needed.
 
 use super::file::{BakedSet, Probe};
-use super::qhmap::{ParameterMap, map_paths};
-use crate::io::{ExrImage, atomic, provenance::hash_file};
+use super::parameter_map::{ParameterMap, map_paths};
+use crate::io::provenance::hash_file;
+use crate::io::{ExrImage, atomic};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::Vec3;

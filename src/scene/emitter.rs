@@ -1,8 +1,8 @@
 //! Emitters of the scene file.
 
-use super::Texture;
-use super::image::Image;
-use crate::math::Rgb;
+use crate::base::math::Rgb;
+use crate::material::Texture;
+use crate::material::image::Image;
 use glam::{Affine3A, Vec3};
 use std::sync::Arc;
 

@@ -11,7 +11,7 @@
 //! of the triangles about it (Rusinkiewicz 2004). It sees curvature where a strip of quads has no inner vertex.
 
 use super::paraboloid::Curvature;
-use crate::math::Frame;
+use crate::base::math::Frame;
 use glam::{DVec3, Vec3};
 use std::f64::consts::TAU;
 

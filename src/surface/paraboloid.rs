@@ -7,7 +7,7 @@
 //! k1 = k2 = 1/R), so that moving by `s` along a principal direction turns the normal by `k s` towards that direction,
 //! and the paraboloid is z = -(k1 u² + k2 v²) / 2.
 
-use crate::math::Frame;
+use crate::base::math::Frame;
 use glam::{Mat2, Vec2, Vec3};
 
 /// Principal curvatures and directions at a point; (d1, d2, n) is a right-handed orthonormal frame.
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn tensor_round_trips_in_any_frame() {
         for i in 0..50 {
-            let n = crate::math::direction_from_lat_long(Vec2::new((i as f32 * 0.618).fract(), (i as f32 + 0.5) / 50.0));
+            let n = crate::base::math::direction_from_lat_long(Vec2::new((i as f32 * 0.618).fract(), (i as f32 + 0.5) / 50.0));
             let frame = Frame::from_normal(n);
             let angle = i as f32;
             let d1 = frame.s * angle.cos() + frame.t * angle.sin();

@@ -130,7 +130,7 @@ mod tests {
             let p = mesh.positions[v as usize];
             let inside = p.x > 1e-4 && p.x < 4.0 - 1e-4 && p.y > 1e-4 && p.y < 3.0 - 1e-4;
             let mut ring: Vec<_> = mesh.ring(&rings, v).collect();
-            assert_eq!(super::super::weld::is_interior(&mut ring), inside, "{p}");
+            assert_eq!(crate::surface::weld::is_interior(&mut ring), inside, "{p}");
         }
     }
 

@@ -5,8 +5,8 @@
 //! corner values are luminance times sine at the pixels.
 
 use super::steps::Steps;
-use crate::math::{Rgb, direction_from_lat_long, lat_long_from_direction, luminance};
-use crate::scene::image::Image;
+use crate::base::math::{Rgb, direction_from_lat_long, lat_long_from_direction, luminance};
+use crate::material::image::Image;
 use glam::{Affine3A, Mat3, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;

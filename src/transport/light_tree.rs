@@ -333,7 +333,7 @@ fn split(bounds: &[LightBounds], order: &mut [u32]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{hash_words, unit};
+    use crate::base::math::{hash_words, unit};
 
     fn random(words: &[u32]) -> f32 {
         unit(hash_words(words))

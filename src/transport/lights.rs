@@ -5,12 +5,12 @@
 //! the side that its shading normal points to, as Mitsuba's. Ours: a density by solid angle always uses the geometric
 //! normal, which Mitsuba replaces by the shading normal on smooth meshes.
 
-use super::Surface;
 use super::envmap::Envmap;
 use super::light_tree::{LightBounds, LightTree, Receiver};
-use crate::math::{Rgb, luminance};
-use crate::scene::shapes::normals::unit_normal;
-use crate::scene::{Emitter, Geometry, Object, Scene, Texture};
+use crate::base::math::{Rgb, luminance};
+use crate::material::{Surface, Texture};
+use crate::scene::normals::unit_normal;
+use crate::scene::{Emitter, Geometry, Object, Scene};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -431,7 +431,7 @@ mod tests {
             let found = Surface {
                 p: sample.point,
                 ng: Vec3::NEG_Y,
-                frame: crate::math::Frame::from_normal(Vec3::NEG_Y),
+                frame: crate::base::math::Frame::from_normal(Vec3::NEG_Y),
                 uv: Vec2::ZERO,
                 dp_du: Vec3::ZERO,
                 dp_dv: Vec3::ZERO,

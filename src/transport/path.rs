@@ -5,11 +5,13 @@
 //! layers, each with the noise of a render of that layer alone; and the roulette's throughput leaves the first vertex's
 //! weight out, so that a weak lobe's layer is as well sampled as a strong one's.
 
-use super::bsdf::{Bsdf, BsdfSample, Lobes, Query};
 use super::light_tree::Receiver;
 use super::lights::LightSample;
-use super::{Ray, Sampler, Surface, World};
-use crate::math::Rgb;
+use super::{Sampler, World};
+use crate::base::math::Rgb;
+use crate::base::ray::Ray;
+use crate::material::Surface;
+use crate::material::bsdf::{Bsdf, BsdfSample, Lobes, Query};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -100,7 +102,7 @@ pub fn scattered(
 }
 
 /// Incident, not scattered light: one sample of the light map's quantity ∫ T_in(ω) L(ω) cos θ dω at `surface`, on the side of
-/// `frame.n` (or its back with `back`), with T_in = [`super::bsdf::Bsdf::diffuse_in`]. L holds all paths, direct light included.
+/// `frame.n` (or its back with `back`), with T_in = [`crate::material::bsdf::Bsdf::diffuse_in`]. L holds all paths, direct light included.
 pub fn transmitted_irradiance(
     world: &World,
     surface: &Surface,

@@ -5,7 +5,7 @@
 //! independent. A path draws two sets a vertex; past [`SOBOL_SETS`], where stratification no longer shows, sets are plain
 //! hashes, which cost a third.
 
-use crate::math::{hash_words, hash64, unit};
+use crate::base::math::{hash_words, hash64, unit};
 use glam::Vec2;
 
 /// Sets of four dimensions that are Sobol points; later ones are hashes. Four path vertices.
@@ -23,7 +23,7 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Sample `index` of the stream `stream` (a hash of seed and pixel: see [`crate::math::hash_words`]).
+    /// Sample `index` of the stream `stream` (a hash of seed and pixel: see [`crate::base::math::hash_words`]).
     pub fn new(stream: u32, index: u32) -> Self {
         Self { stream, index, set: 0, values: [0.0; 4], used: 4 }
     }

@@ -66,14 +66,14 @@ mod tests {
         for count in [1, 2, 7, 300] {
             let values: Vec<f64> = (0..count)
                 .map(|i| {
-                    x = crate::math::hash_words(&[x, i]);
+                    x = crate::base::math::hash_words(&[x, i]);
                     if x.is_multiple_of(3) { 0.0 } else { f64::from(x >> 20).powi(3) }
                 })
                 .collect();
             let (steps, total) = Steps::new(values.iter().copied());
             assert_eq!(total, values.iter().sum::<f64>());
             for i in 0..20_000u32 {
-                let u = crate::math::hash_words(&[i, 5]) as f32 / (1u64 << 32) as f32;
+                let u = crate::base::math::hash_words(&[i, 5]) as f32 / (1u64 << 32) as f32;
                 let u = if i < 300 { steps.sums[i as usize % count as usize] } else { u.min(1.0 - f32::EPSILON) };
                 let searched = steps.sums.partition_point(|&s| s <= u).clamp(1, count as usize) - 1;
                 let (found, rest) = steps.pick(u);

@@ -1,9 +1,10 @@
 //! A scene made ready for rays.
 
 use super::bvh::Bvh;
+use super::facet::Facet;
 use super::lights::Lights;
-use super::surface::Facet;
-use super::{Hit, Ray, Surface};
+use crate::base::ray::{Hit, Ray};
+use crate::material::Surface;
 use crate::scene::Scene;
 use rayon::prelude::*;
 

@@ -2,10 +2,10 @@
 
 use super::models::*;
 use glam::Vec3;
-use reprobe::math::Rgb;
+use reprobe::base::math::Rgb;
+use reprobe::material::bsdf::warp::direction;
+use reprobe::material::bsdf::*;
 use reprobe::transport::Sampler;
-use reprobe::transport::bsdf::warp::direction;
-use reprobe::transport::bsdf::*;
 
 const VIEWS: [f32; 5] = [1.0, 0.8, 0.4, 0.15, 0.04];
 

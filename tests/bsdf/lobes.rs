@@ -2,10 +2,10 @@
 
 use super::models::*;
 use glam::{Vec2, Vec3};
-use reprobe::math::Rgb;
+use reprobe::base::math::Rgb;
+use reprobe::material::bsdf::warp::direction;
+use reprobe::material::bsdf::*;
 use reprobe::transport::Sampler;
-use reprobe::transport::bsdf::warp::direction;
-use reprobe::transport::bsdf::*;
 use std::f32::consts::FRAC_1_PI;
 
 const ALL: [&str; 13] = [

@@ -1,12 +1,11 @@
 //! The models of scripts/bsdf_reference.py, by name, and the surface that they lie on.
 
 use glam::{Affine2, Vec2, Vec3};
-use reprobe::math::{Frame, Rgb};
-use reprobe::scene::Texture;
-use reprobe::scene::image::Image;
-use reprobe::scene::texture::{Bitmap, Wrap};
-use reprobe::transport::Surface;
-use reprobe::transport::bsdf::*;
+use reprobe::base::math::{Frame, Rgb};
+use reprobe::material::bsdf::*;
+use reprobe::material::image::Image;
+use reprobe::material::texture::{Bitmap, Wrap};
+use reprobe::material::{Surface, Texture};
 use std::sync::Arc;
 
 pub fn grey(v: f32) -> Texture {

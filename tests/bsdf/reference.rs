@@ -2,7 +2,7 @@
 
 use super::models::{model, surface};
 use glam::{Vec2, Vec3};
-use reprobe::transport::bsdf::{Lobes, Query};
+use reprobe::material::bsdf::{Lobes, Query};
 use serde::Deserialize;
 
 #[derive(Deserialize)]

@@ -2,10 +2,11 @@
 
 use super::models::{model, surface};
 use glam::{Vec2, Vec3};
-use reprobe::math::Rgb;
-use reprobe::transport::bsdf::warp::direction;
-use reprobe::transport::bsdf::{Bsdf, Lobes, Query};
-use reprobe::transport::{Sampler, Surface};
+use reprobe::base::math::Rgb;
+use reprobe::material::Surface;
+use reprobe::material::bsdf::warp::direction;
+use reprobe::material::bsdf::{Bsdf, Lobes, Query};
+use reprobe::transport::Sampler;
 
 /// Models with a density; those without delta lobes are drawn from in full.
 const MODELS: [&str; 17] = [

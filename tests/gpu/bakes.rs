@@ -2,13 +2,14 @@
 
 use crate::{gpu, room};
 use glam::Vec3;
-use reprobe::gpu::{GpuScene, LightPaths, ProbePaths};
+use reprobe::base::math::Rgb;
+use reprobe::base::progress::Silent;
+use reprobe::gpu::{GpuScene, LightPaths};
 use reprobe::lightmap::parts::Memory;
 use reprobe::lightmap::{AtlasParams, BakeParams as LightParams, LightMap, Plan};
-use reprobe::math::Rgb;
-use reprobe::probe::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
-use reprobe::probe::qhmap::ParameterMap;
-use reprobe::progress::Silent;
+use reprobe::method::glossy_probes::bake::{Bake, BakeParams, bake_glossy, probe_geometry};
+use reprobe::method::glossy_probes::gpu::paths::ProbePaths;
+use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::transport::World;
 use std::sync::Arc;
 

@@ -3,16 +3,18 @@
 use crate::bakes::lightmap;
 use crate::paths::difference;
 use crate::{gpu, room};
-use reprobe::gpu::{BaselineFrame, ImageSpaceGather, LightmapRt};
+use reprobe::base::math::Rgb;
+use reprobe::gpu::view::frame::BaselineFrame;
 use reprobe::lightmap::{AtlasParams, BakeParams, LightMap};
-use reprobe::math::Rgb;
-use reprobe::render::baseline::image_space_gather::{ImageSpaceGatherParams, gather_image, mirror_image};
-use reprobe::render::baseline::lightmap_rt::{LightmapRtParams, lightmap_rt};
-use reprobe::render::composite::{diffuse_layer, downsample, emission_layer};
-use reprobe::render::gbuffer::{GBuffer, gbuffer};
+use reprobe::method::image_space_gather::gpu::ImageSpaceGather;
+use reprobe::method::image_space_gather::{ImageSpaceGatherParams, gather_image, mirror_image};
+use reprobe::method::lightmap_rt::gpu::LightmapRt;
+use reprobe::method::lightmap_rt::{LightmapRtParams, lightmap_rt};
 use reprobe::scene::Camera;
 use reprobe::surface::CurvatureMap;
 use reprobe::transport::World;
+use reprobe::view::composite::{diffuse_layer, downsample, emission_layer};
+use reprobe::view::gbuffer::{GBuffer, gbuffer};
 
 /// The room with a light map, and a view of it with 2 x 2 rays a pixel.
 struct Setting {

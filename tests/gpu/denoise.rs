@@ -2,11 +2,12 @@
 
 use crate::paths::zoo;
 use crate::{gpu, room};
-use reprobe::gpu::{Denoiser, Gpu, GpuGuides, GpuScene};
-use reprobe::math::Rgb;
-use reprobe::progress::Silent;
-use reprobe::render::baseline::denoise::{DenoiseParams, Guide, denoise, guides};
-use reprobe::render::path_trace::{PathTraceParams, path_trace};
+use reprobe::base::math::Rgb;
+use reprobe::base::progress::Silent;
+use reprobe::gpu::{Gpu, GpuScene};
+use reprobe::method::path_trace::denoise::{DenoiseParams, Guide, denoise, guides};
+use reprobe::method::path_trace::denoise_gpu::{Denoiser, GpuGuides};
+use reprobe::method::path_trace::{PathTraceParams, path_trace};
 use reprobe::scene::Camera;
 use reprobe::transport::World;
 use std::sync::Arc;

@@ -2,8 +2,8 @@
 
 use crate::gpu;
 use glam::Vec3;
-use reprobe::gpu::Filter;
-use reprobe::render::filter::{FilterInput, FilterParams, Kernel, Method, NOT_GLOSSY, filter};
+use reprobe::method::glossy_probes::filter::{FilterInput, FilterParams, Kernel, Method, NOT_GLOSSY, filter};
+use reprobe::method::glossy_probes::gpu::filter::Filter;
 use reprobe::transport::Sampler;
 
 #[test]

@@ -29,7 +29,7 @@ fn gpu() -> Option<Arc<Gpu>> {
 }
 
 fn room() -> World {
-    let scene = reprobe::scene::load(Path::new("scenes/room/scene.xml"), &Default::default()).unwrap();
+    let scene = reprobe::exchange::load(Path::new("scenes/room/scene.xml"), &Default::default()).unwrap();
     World::opaque(scene).0
 }
 

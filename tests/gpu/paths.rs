@@ -3,13 +3,15 @@
 
 use crate::{gpu, room};
 use glam::Vec3;
-use reprobe::gpu::{GpuScene, PathTracer};
-use reprobe::math::Rgb;
-use reprobe::progress::Silent;
-use reprobe::render::path_trace::{LayerImages, PathTraceParams, path_trace, path_trace_full};
+use reprobe::base::math::Rgb;
+use reprobe::base::progress::Silent;
+use reprobe::gpu::GpuScene;
+use reprobe::method::path_trace::gpu::PathTracer;
+use reprobe::method::path_trace::{PathTraceParams, path_trace, path_trace_full};
 use reprobe::scene::Camera;
 use reprobe::transport::World;
 use reprobe::transport::path::PathParams;
+use reprobe::view::layers::LayerImages;
 use std::sync::Arc;
 
 /// Share of the pixels that differ by more than rounding, and by how much the means do.
@@ -111,7 +113,7 @@ pub fn zoo(folder: &std::path::Path) -> World {
     );
     let file = folder.join("zoo.xml");
     std::fs::write(&file, text).unwrap();
-    World::new(reprobe::scene::load(&file, &Default::default()).unwrap())
+    World::new(reprobe::exchange::load(&file, &Default::default()).unwrap())
 }
 
 #[test]
@@ -136,7 +138,7 @@ fn a_model_that_the_gpu_lacks_is_named() {
     );
     let file = folder.path().join("twice.xml");
     std::fs::write(&file, text).unwrap();
-    let world = World::new(reprobe::scene::load(&file, &Default::default()).unwrap());
+    let world = World::new(reprobe::exchange::load(&file, &Default::default()).unwrap());
     let Err(error) = GpuScene::new(gpu, &world) else { panic!("took it") };
     assert!(error.to_string().contains("twice") && error.to_string().contains("--device cpu"), "{error}");
 }

@@ -2,11 +2,12 @@
 
 use crate::{gpu, room};
 use glam::Vec3;
+use reprobe::base::math::direction_from_lat_long;
+use reprobe::base::ray::{Hit, Ray};
 use reprobe::gpu::{Gpu, GpuScene, RayTracer};
-use reprobe::math::direction_from_lat_long;
-use reprobe::probe::seen::SeenBuffers;
+use reprobe::method::glossy_probes::seen::SeenBuffers;
 use reprobe::scene::Scene;
-use reprobe::transport::{Hit, Ray, Sampler, World};
+use reprobe::transport::{Sampler, World};
 use std::sync::Arc;
 
 fn tracer(gpu: Arc<Gpu>, world: &World) -> RayTracer {
@@ -66,7 +67,7 @@ fn rays_go_on_through_alpha_masks_as_on_the_cpu() {
     let Some(gpu) = gpu() else { return };
     let mut scene = room().scene;
     for material in scene.materials.iter_mut().step_by(2) {
-        material.opacity = Some(reprobe::scene::Texture::Constant(Vec3::splat(0.5)));
+        material.opacity = Some(reprobe::material::Texture::Constant(Vec3::splat(0.5)));
     }
     let world = World::opaque(scene).0;
     let rays = rays(&world, 20_000);

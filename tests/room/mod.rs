@@ -1,10 +1,11 @@
 //! Small worlds built by hand.
 
 use glam::{Vec2, Vec3};
-use reprobe::math::Rgb;
-use reprobe::scene::{Emitter, Material, Object, Scene, Texture};
+use reprobe::base::math::Rgb;
+use reprobe::material::bsdf::{Bsdf, TwoSided};
+use reprobe::material::{Material, Texture};
+use reprobe::scene::{Emitter, Object, Scene};
 use reprobe::transport::World;
-use reprobe::transport::bsdf::{Bsdf, TwoSided};
 
 /// A scene under construction.
 #[derive(Default)]

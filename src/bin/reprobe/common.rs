@@ -2,10 +2,10 @@
 
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use reprobe::base::progress::Progress;
+use reprobe::exchange::{LoadOptions, load};
 use reprobe::gpu::{Choice, Gpu};
-use reprobe::progress::Progress;
-use reprobe::scene::load::LoadOptions;
-use reprobe::scene::{Scene, load};
+use reprobe::scene::Scene;
 use reprobe::transport::World;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};

@@ -3,11 +3,11 @@
 use crate::common::{Common, Outcome};
 use anyhow::{Context, bail};
 use rayon::prelude::*;
+use reprobe::base::progress::Progress;
 use reprobe::io::{ExrImage, Provenance, atomic};
 use reprobe::metric::report::{FrameMetrics, Picture, Report};
 use reprobe::metric::without_noise::without_noise;
 use reprobe::metric::{Metrics, Raster, compare, ssim};
-use reprobe::progress::Progress;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -6,11 +6,11 @@ use crate::render_path::{Args, describe, finish, is_finished};
 use crate::timings::{FrameTimings, Timings, frame_ms};
 use crate::views::View;
 use anyhow::bail;
+use reprobe::base::progress::{Progress, Silent};
 use reprobe::io::{ExrImage, Provenance};
-use reprobe::progress::{Progress, Silent};
-use reprobe::render::aov::with_first_hits;
-use reprobe::render::path_trace::LayerImages;
 use reprobe::transport::World;
+use reprobe::view::aov::with_first_hits;
+use reprobe::view::layers::LayerImages;
 use serde_json::{Value, json};
 
 /// Frames that are rendered to find the sample count of a budget.

@@ -7,7 +7,7 @@ use reprobe::io::Provenance;
 use reprobe::probe::placement::{Density, ProbeGrid};
 use reprobe::probe::reach::{ReachParams, blocked, reach};
 use reprobe::scene::Scene;
-use reprobe::scene::path::load as load_path;
+use reprobe::scene::camera_path::load as load_path;
 use serde_json::json;
 use std::path::PathBuf;
 

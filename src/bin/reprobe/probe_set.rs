@@ -2,9 +2,9 @@
 
 use crate::common::Common;
 use rayon::prelude::*;
+use reprobe::base::progress::Progress;
 use reprobe::io::ExrImage;
 use reprobe::probe::set::{ProbeSet, numbered};
-use reprobe::progress::Progress;
 use std::path::Path;
 use std::sync::Mutex;
 

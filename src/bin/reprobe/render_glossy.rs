@@ -1,25 +1,25 @@
 //! `reprobe render-path --method glossy-probes`.
 
-use crate::common::Common;
-use crate::common::Outcome;
+use crate::common::{Common, Outcome};
 use crate::render_path::{Args, describe, finish, is_finished, views_of};
 use crate::set_params::apply;
 use crate::timings::{FrameTimings, Timings, timed};
 use crate::views::largest;
 use anyhow::{Context, bail};
+use reprobe::base::progress::Progress;
 use reprobe::gpu;
 use reprobe::io::provenance::hash_file;
 use reprobe::io::{ExrImage, Provenance};
 use reprobe::lightmap::LightMap;
+use reprobe::method::glossy_probes::GlossyProbeParams;
+use reprobe::method::glossy_probes::inspect::with_passes;
+use reprobe::method::glossy_probes::renderer::{Frame, Renderer};
+use reprobe::method::glossy_probes::wanted::Views;
 use reprobe::probe::store::ProbeStore;
-use reprobe::probe::wanted::Views;
-use reprobe::progress::Progress;
-use reprobe::render::aov::with_first_hits;
-use reprobe::render::glossy_probes::{Frame, GlossyProbeParams, Renderer};
-use reprobe::render::inspect::with_passes;
 use reprobe::scene::Camera;
 use reprobe::surface::curvature_file;
 use reprobe::transport::World;
+use reprobe::view::aov::with_first_hits;
 use serde_json::json;
 
 /// Probes kept in memory by default: the eight of one camera, and those of the cells around it.

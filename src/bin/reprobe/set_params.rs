@@ -63,7 +63,7 @@ fn walk(prefix: &str, node: &Value, lines: &mut Vec<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use reprobe::render::glossy_probes::GlossyProbeParams;
+    use reprobe::method::glossy_probes::GlossyProbeParams;
 
     #[test]
     fn lists_are_split_outside_of_brackets() {

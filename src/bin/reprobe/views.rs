@@ -2,7 +2,7 @@
 
 use crate::common::Common;
 use anyhow::{Context, bail};
-use reprobe::scene::{Camera, Scene, path};
+use reprobe::scene::{Camera, Scene, camera_path as path};
 use std::path::Path;
 
 /// A frame of a path.

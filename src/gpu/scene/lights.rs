@@ -11,7 +11,7 @@ use glam::Mat3;
 /// `Emitter` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
-pub(super) struct GpuEmitter {
+pub(crate) struct GpuEmitter {
     position: [f32; 3],
     kind: u32,
     direction: [f32; 3],
@@ -33,7 +33,7 @@ const AT_INFINITY: u32 = 4;
 /// `Near` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
-pub(super) struct GpuNear {
+pub(crate) struct GpuNear {
     triangle: u32,
     emitter: u32,
     area: f32,
@@ -43,7 +43,7 @@ pub(super) struct GpuNear {
 /// `Environment` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
-pub(super) struct GpuEnvironment {
+pub(crate) struct GpuEnvironment {
     world_from_local: [[f32; 4]; 3],
     local_from_world: [[f32; 4]; 3],
     color: [f32; 3],
@@ -55,7 +55,7 @@ pub(super) struct GpuEnvironment {
     mean: f32,
 }
 
-pub(super) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tables) -> Vec<GpuEmitter> {
+pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tables) -> Vec<GpuEmitter> {
     let of = |(i, emitter): (usize, &Emitter)| match emitter {
         Emitter::Area { object, radiance } => GpuEmitter {
             kind: AREA,
@@ -87,7 +87,7 @@ pub(super) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
     world.scene.emitters.iter().enumerate().map(of).collect()
 }
 
-pub(super) fn near(world: &World) -> Vec<GpuNear> {
+pub(crate) fn near(world: &World) -> Vec<GpuNear> {
     let of = |near: &Near| match near {
         Near::Triangle(t) => GpuNear { triangle: t.index, emitter: t.emitter, area: t.area, padding: 0 },
         Near::Delta(emitter) => GpuNear { triangle: NONE, emitter: *emitter, ..GpuNear::default() },
@@ -95,7 +95,7 @@ pub(super) fn near(world: &World) -> Vec<GpuNear> {
     world.lights.near.iter().map(of).collect()
 }
 
-pub(super) fn environments(world: &World, textures: &mut Textures, tables: &mut Tables) -> Vec<GpuEnvironment> {
+pub(crate) fn environments(world: &World, textures: &mut Textures, tables: &mut Tables) -> Vec<GpuEnvironment> {
     let columns = |m: &Mat3| m.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]);
     let of = |environment: &Environment| match environment {
         Environment::Constant(color) => GpuEnvironment { color: color.to_array(), ..GpuEnvironment::default() },
@@ -116,9 +116,9 @@ pub(super) fn environments(world: &World, textures: &mut Textures, tables: &mut 
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::layout::check;
-    use super::super::RAYS;
     use super::*;
+    use crate::gpu::layout::check;
+    use crate::gpu::scene::RAYS;
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {

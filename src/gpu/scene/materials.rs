@@ -2,15 +2,15 @@
 
 use super::textures::Textures;
 use super::{NONE, Tables};
-use crate::scene::{Material, Texture};
-use crate::transport::bsdf::roughplastic::COSINES;
-use crate::transport::bsdf::{Bsdf, Distribution, Lobes, PlasticParams};
+use crate::material::bsdf::roughplastic::COSINES;
+use crate::material::bsdf::{Bsdf, Distribution, Lobes, PlasticParams};
+use crate::material::{Material, Texture};
 use bytemuck::{Pod, Zeroable};
 
 /// `Material` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct GpuMaterial {
+pub(crate) struct GpuMaterial {
     model: u32,
     opacity: u32,
     lobes: u32,
@@ -23,7 +23,7 @@ const TWO_SIDED_FLAG: u32 = 2;
 /// `Model` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
-pub(super) struct GpuModel {
+pub(crate) struct GpuModel {
     kind: u32,
     distribution: u32,
     lobes: u32,
@@ -62,7 +62,7 @@ enum Kind {
 }
 
 /// All models, children before their parents.
-pub(super) struct Models<'a> {
+pub(crate) struct Models<'a> {
     pub list: Vec<GpuModel>,
     pub textures: &'a mut Textures,
     pub tables: &'a mut Tables,
@@ -218,7 +218,7 @@ fn family(distribution: Distribution) -> u32 {
 }
 
 /// Tilted frames that lie one within the other.
-pub(super) fn tilts(bsdf: &Bsdf) -> usize {
+pub(crate) fn tilts(bsdf: &Bsdf) -> usize {
     match bsdf {
         Bsdf::BumpMap(m) => 1 + tilts(&m.nested),
         Bsdf::NormalMap(m) => 1 + tilts(&m.nested),
@@ -233,9 +233,9 @@ const _: () = assert!(COSINES == 64);
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::layout::check;
-    use super::super::RAYS;
     use super::*;
+    use crate::gpu::layout::check;
+    use crate::gpu::scene::RAYS;
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {

@@ -6,9 +6,9 @@ mod textures;
 
 use super::Gpu;
 use crate::lightmap::LightMap;
+use crate::material::bsdf::{Distribution, albedo};
 use crate::transport::World;
-use crate::transport::bsdf::{Distribution, albedo};
-use crate::transport::surface::Facet;
+use crate::transport::facet::Facet;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable, cast_slice};
 use lights::{emitters, environments, near};
@@ -18,7 +18,7 @@ use std::sync::Arc;
 use textures::Textures;
 
 /// What traces rays through a scene.
-pub(super) const RAYS: &str = concat!(
+pub(crate) const RAYS: &str = concat!(
     include_str!("../../../shaders/math.wgsl"),
     include_str!("../../../shaders/random.wgsl"),
     include_str!("../../../shaders/scene.wgsl"),
@@ -28,7 +28,7 @@ pub(super) const RAYS: &str = concat!(
 );
 
 /// What scatters light, after [`RAYS`].
-pub(super) const MATERIALS: &str = concat!(
+pub(crate) const MATERIALS: &str = concat!(
     include_str!("../../../shaders/fresnel.wgsl"),
     include_str!("../../../shaders/microfacet.wgsl"),
     include_str!("../../../shaders/models.wgsl"),
@@ -38,7 +38,7 @@ pub(super) const MATERIALS: &str = concat!(
 );
 
 /// What follows paths, after [`MATERIALS`].
-pub(super) const PATHS: &str = concat!(
+pub(crate) const PATHS: &str = concat!(
     include_str!("../../../shaders/light_tree.wgsl"),
     include_str!("../../../shaders/envmap.wgsl"),
     include_str!("../../../shaders/lights.wgsl"),
@@ -86,15 +86,15 @@ impl Tables {
 /// A scene's triangles, materials and emitters on a device.
 #[derive(Clone)]
 pub struct GpuScene {
-    pub(super) gpu: Arc<Gpu>,
+    pub(crate) gpu: Arc<Gpu>,
     /// The bindings before `scene`, in order.
     fixed: Vec<wgpu::Buffer>,
     params: SceneParams,
     /// Bytes of the light map.
     light_bytes: u64,
-    pub(super) has_masks: bool,
-    pub(super) layout: wgpu::BindGroupLayout,
-    pub(super) group: wgpu::BindGroup,
+    pub(crate) has_masks: bool,
+    pub(crate) layout: wgpu::BindGroupLayout,
+    pub(crate) group: wgpu::BindGroup,
 }
 
 /// Bindings of the group.
@@ -174,7 +174,7 @@ impl GpuScene {
 
     /// The same scene with a light map to look diffuse light up in.
     pub fn with_lightmap(&self, map: &LightMap) -> Result<Self> {
-        let floats = |side: &[crate::math::Rgb]| side.iter().flat_map(|c| c.to_array()).collect::<Vec<f32>>();
+        let floats = |side: &[crate::base::math::Rgb]| side.iter().flat_map(|c| c.to_array()).collect::<Vec<f32>>();
         let mut texels = floats(&map.front);
         let light_back = map.back.as_ref().map_or(NONE, |_| texels.len() as u32);
         texels.extend(map.back.iter().flat_map(|back| floats(back)));
@@ -188,12 +188,12 @@ impl GpuScene {
     }
 
     /// What it takes on the device, bytes.
-    pub(super) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.fixed.iter().map(wgpu::Buffer::size).sum::<u64>() + self.light_bytes
     }
 
     /// Whether there is a light map to look diffuse light up in.
-    pub(super) fn has_lightmap(&self) -> bool {
+    pub(crate) fn has_lightmap(&self) -> bool {
         self.params.light_width > 0
     }
 
@@ -204,7 +204,7 @@ impl GpuScene {
 }
 
 /// A layout of `reads` buffers to read, and after them `writes` to write.
-pub(super) fn layout(device: &wgpu::Device, label: &str, reads: u32, writes: u32) -> wgpu::BindGroupLayout {
+pub(crate) fn layout(device: &wgpu::Device, label: &str, reads: u32, writes: u32) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = (0..reads + writes)
         .map(|binding| wgpu::BindGroupLayoutEntry {
             binding,
@@ -286,8 +286,8 @@ fn depth(tree: &CwBvh) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::check;
     use super::*;
+    use crate::gpu::layout::check;
     use crate::transport::light_tree::Node;
 
     #[test]

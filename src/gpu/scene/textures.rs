@@ -1,9 +1,9 @@
 //! Textures and the pixels of their images.
 
 use super::{NONE, Tables};
-use crate::scene::Texture;
-use crate::scene::image::{Image, Pixels};
-use crate::scene::texture::Wrap;
+use crate::material::Texture;
+use crate::material::image::{Image, Pixels};
+use crate::material::texture::Wrap;
 use bytemuck::{Pod, Zeroable};
 use glam::Affine2;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// `Image` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub(super) struct GpuImage {
+pub(crate) struct GpuImage {
     offset: u32,
     width: u32,
     height: u32,
@@ -21,7 +21,7 @@ pub(super) struct GpuImage {
 /// `Texture` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
-pub(super) struct GpuTexture {
+pub(crate) struct GpuTexture {
     to_u: [f32; 3],
     kind: u32,
     to_v: [f32; 3],
@@ -39,7 +39,7 @@ const CHECKERBOARD: u32 = 2;
 
 /// All textures, with each image once.
 #[derive(Default)]
-pub(super) struct Textures {
+pub(crate) struct Textures {
     pub list: Vec<GpuTexture>,
     /// Words that the images' offsets count.
     pub pixels: Vec<u32>,
@@ -109,9 +109,9 @@ fn placed(to_uv: &Affine2) -> GpuTexture {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::layout::check;
-    use super::super::RAYS;
     use super::*;
+    use crate::gpu::layout::check;
+    use crate::gpu::scene::RAYS;
 
     #[test]
     fn structs_are_laid_out_as_in_the_shader() {

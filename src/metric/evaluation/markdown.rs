@@ -140,8 +140,8 @@ fn probes(evaluation: &Evaluation, costs: &Costs) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::example;
     use super::*;
+    use crate::metric::evaluation::tests::example;
 
     #[test]
     fn tables_have_a_row_a_method_and_the_best_in_bold() {

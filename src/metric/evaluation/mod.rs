@@ -75,7 +75,7 @@ pub struct FrameErrors {
     /// Errors of the frame.
     #[serde(flatten)]
     pub metrics: Metrics,
-    /// Change of the error since the frame before ([`super::temporal`]); `None` where that frame is not there.
+    /// Change of the error since the frame before ([`crate::metric::temporal`]); `None` where that frame is not there.
     pub change: Option<f64>,
 }
 

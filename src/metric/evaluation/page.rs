@@ -78,8 +78,8 @@ pub fn html(evaluation: &Evaluation, costs: &Costs, shown: &BTreeMap<String, Sho
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::example;
     use super::*;
+    use crate::metric::evaluation::tests::example;
 
     #[test]
     fn the_page_holds_its_pictures_and_a_name_cannot_break_out_of_it() {

@@ -15,10 +15,10 @@ mod traverse;
 mod triangle;
 mod wide;
 
-use super::surface::uv_at;
-use super::{Hit, Ray};
-use crate::math::{hash_words, luminance, unit};
-use crate::scene::shapes::normals::unit_normal;
+use super::facet::uv_at;
+use crate::base::math::{hash_words, luminance, unit};
+use crate::base::ray::{Hit, Ray};
+use crate::scene::normals::unit_normal;
 use crate::scene::{Geometry, Scene};
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -26,8 +26,7 @@ use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 #[cfg(target_arch = "x86_64")]
-use simd::{Avx2, Avx512};
-use simd::{Portable, Simd};
+use simd::{Avx2, Avx512, Portable, Simd};
 use std::cell::RefCell;
 use traverse::STACK;
 use wide::Tree;

@@ -165,7 +165,7 @@ pub use x86::{Avx2, Avx512};
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{COMPRESS, Simd};
+    use crate::transport::bvh::simd::{COMPRESS, Simd};
     use std::arch::x86_64::*;
 
     /// AVX2 and FMA. Only [`Avx2::detect`] makes one.

@@ -1,9 +1,10 @@
 use super::triangle::Shear;
 use super::*;
-use crate::math::{Rgb, direction_from_lat_long};
-use crate::scene::shapes::{self, Mesh, primitives};
-use crate::scene::{Geometry, Material, Texture};
-use crate::transport::bsdf::{Bsdf, Diffuse};
+use crate::base::math::{Rgb, direction_from_lat_long};
+use crate::material::bsdf::{Bsdf, Diffuse};
+use crate::material::{Material, Texture};
+use crate::scene::mesh::Mesh;
+use crate::scene::{Geometry, mesh as shapes, primitives};
 use glam::{Mat4, Vec2, Vec3};
 
 /// Uniform numbers in [0, 1) from a counter.

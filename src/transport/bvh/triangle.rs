@@ -6,7 +6,7 @@
 //!
 //! Ours: the distance is the barycentric mean of the corners' depths, so that it lies between them whatever the scale.
 
-use super::super::Ray;
+use crate::base::ray::Ray;
 #[cfg(test)]
 use glam::Vec3;
 

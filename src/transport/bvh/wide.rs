@@ -1,4 +1,4 @@
-//! The eight-wide tree, cut out of obvhs's binary tree: see [`super::cut`].
+//! The eight-wide tree, cut out of obvhs's binary tree: see [`crate::transport::bvh::cut`].
 //!
 //! Ours. Children take the slot of the octant they lie in, seen from the node's middle, so that a ray finds near children
 //! first by visiting slots in the order slot xor (signs of its direction), without sorting (Garanzha and Loop 2010, Ylitie

@@ -4,12 +4,12 @@ use crate::common::Common;
 use crate::compare::read_pair;
 use anyhow::{Context, bail};
 use rayon::prelude::*;
+use reprobe::base::progress::Progress;
 use reprobe::io::ExrImage;
 use reprobe::metric::evaluation::{FrameErrors, LayerErrors, Pictures, Shown, jpeg_gray, jpeg_rgb};
 use reprobe::metric::flip::to_rgb8;
 use reprobe::metric::temporal::{change, signed_error};
 use reprobe::metric::{compare, display};
-use reprobe::progress::Progress;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

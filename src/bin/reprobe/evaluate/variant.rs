@@ -187,7 +187,7 @@ pub fn paper(probes: u32) -> Result<Vec<Variant>, String> {
 mod tests {
     use super::*;
     use crate::set_params::apply;
-    use reprobe::render::glossy_probes::GlossyProbeParams;
+    use reprobe::method::glossy_probes::GlossyProbeParams;
 
     #[test]
     fn a_variant_tells_options_of_frames_and_bakes_and_parameters_apart() {

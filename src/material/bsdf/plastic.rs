@@ -1,0 +1,138 @@
+//! A smooth dielectric coating over a diffuse base (Mitsuba's `plastic`).
+
+use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
+use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio};
+use crate::Result;
+use crate::base::math::Rgb;
+use crate::material::Texture;
+use glam::{Vec2, Vec3};
+
+/// What `plastic` and `roughplastic` share in a scene file.
+#[derive(Debug, Clone)]
+pub struct PlasticParams {
+    /// Index of refraction of the inside. Mitsuba: polypropylene, 1.49.
+    pub int_ior: f32,
+    /// Index of refraction of the outside. Mitsuba: air, 1.000277.
+    pub ext_ior: f32,
+    /// Whether internal reflections saturate the colour of the base.
+    pub nonlinear: bool,
+    /// Albedo of the base. Mitsuba: 0.5.
+    pub diffuse_reflectance: Texture,
+    /// Factor on the specular reflection. Mitsuba: 1.
+    pub specular_reflectance: Texture,
+}
+
+/// A plastic's colours at a point.
+#[derive(Clone, Copy)]
+pub(super) struct Colours {
+    pub diffuse: Rgb,
+    pub specular: Rgb,
+}
+
+impl PlasticParams {
+    pub(super) fn at(&self, s: &Surface) -> Colours {
+        Colours { diffuse: self.diffuse_reflectance.eval(s.uv), specular: self.specular_reflectance.eval(s.uv) }
+    }
+
+    /// Radiance of a base of albedo `diffuse`, per irradiance that reaches it through the coating and over the two
+    /// transmissions: albedo · Σ (internal reflections) / eta².
+    pub(super) fn base(&self, diffuse: Rgb, eta: f32, internal_reflectance: f32) -> Rgb {
+        let lost = if self.nonlinear { diffuse * internal_reflectance } else { Rgb::splat(internal_reflectance) };
+        diffuse / ((Rgb::ONE - lost) * (eta * eta))
+    }
+}
+
+impl Colours {
+    /// Probability of drawing the specular lobe, of which the coating reflects the share `reflected` at `wi`.
+    /// Mitsuba's rule, with the colours at the point in place of their means over the textures.
+    pub(super) fn specular_probability(&self, reflected: f32, query: Query) -> f32 {
+        if query.lobes != Lobes::ALL {
+            return if query.lobes.contains(Lobes::NON_DIFFUSE) { 1.0 } else { 0.0 };
+        }
+        let (specular, diffuse) = (self.specular.element_sum() * reflected, self.diffuse.element_sum() * (1.0 - reflected));
+        if specular > 0.0 { specular / (specular + diffuse) } else { 0.0 }
+    }
+}
+
+/// The model, with what its parameters imply.
+#[derive(Debug, Clone)]
+pub struct Plastic {
+    /// Parameters as given.
+    pub params: PlasticParams,
+    pub(crate) eta: f32,
+    pub(crate) internal_reflectance: f32,
+}
+
+impl Plastic {
+    /// Refuses indices of refraction that are not positive and finite.
+    pub fn new(params: PlasticParams) -> Result<Self> {
+        let eta = positive_ratio("plastic", params.int_ior, params.ext_ior)?;
+        Ok(Self { params, eta, internal_reflectance: fresnel::diffuse_reflectance(1.0 / eta) })
+    }
+
+    fn reflected(&self, w: Vec3) -> f32 {
+        fresnel::dielectric(w.z, self.eta).r
+    }
+
+    /// Value and density of the diffuse lobe, for directions above the surface; `f_i` = reflected(wi).
+    fn diffuse(&self, colours: &Colours, f_i: f32, wo: Vec3, query: Query) -> (Rgb, f32) {
+        let pdf = cosine_hemisphere_pdf(wo);
+        let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
+        let value = base * ((1.0 - f_i) * (1.0 - self.reflected(wo)) * pdf);
+        (value, pdf * (1.0 - colours.specular_probability(f_i, query)))
+    }
+}
+
+impl Scatter for Plastic {
+    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
+        if wi.z <= 0.0 || wo.z <= 0.0 || !query.lobes.contains(Lobes::DIFFUSE) {
+            return (Rgb::ZERO, 0.0);
+        }
+        self.diffuse(&self.params.at(s), self.reflected(wi), wo, query)
+    }
+
+    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
+        if wi.z <= 0.0 {
+            return None;
+        }
+        let (f_i, colours) = (self.reflected(wi), self.params.at(s));
+        let p = colours.specular_probability(f_i, query);
+        if u < p {
+            return Some(BsdfSample::mirrored(wi, colours.specular * (f_i / p), p));
+        }
+        let wo = cosine_hemisphere(v);
+        let (value, pdf) = self.diffuse(&colours, f_i, wo, query);
+        BsdfSample::reflected(wo, value / pdf, pdf)
+    }
+
+    fn lobes(&self) -> Lobes {
+        Lobes::ALL
+    }
+
+    fn diffuse_out(&self, s: &Surface, wi: Vec3) -> Rgb {
+        if wi.z <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let albedo = self.params.diffuse_reflectance.eval(s.uv);
+        self.params.base(albedo, self.eta, self.internal_reflectance) * (1.0 - self.reflected(wi))
+    }
+
+    fn diffuse_in(&self, _s: &Surface, wo: Vec3) -> f32 {
+        if wo.z > 0.0 { 1.0 - self.reflected(wo) } else { 0.0 }
+    }
+
+    fn diffuse_albedo(&self, s: &Surface, wi: Vec3) -> Rgb {
+        self.diffuse_out(s, wi) * (1.0 - fresnel::diffuse_reflectance(self.eta))
+    }
+
+    fn glossy_albedo(&self, s: &Surface, wi: Vec3, _query: Query) -> Rgb {
+        if wi.z <= 0.0 {
+            return Rgb::ZERO;
+        }
+        self.params.specular_reflectance.eval(s.uv) * self.reflected(wi)
+    }
+
+    fn alpha(&self, _s: &Surface) -> Option<f32> {
+        Some(0.0)
+    }
+}

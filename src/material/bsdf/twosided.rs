@@ -1,0 +1,74 @@
+//! A model for each side of a surface (Mitsuba's `twosided`).
+
+use super::{Bsdf, BsdfSample, Lobes, Query, Scatter, Surface};
+use crate::base::math::Rgb;
+use crate::{Error, Result};
+use glam::{Vec2, Vec3};
+
+/// Different models in front and behind.
+#[derive(Debug, Clone)]
+pub struct TwoSided {
+    /// Seen where cos > 0.
+    pub front: Box<Bsdf>,
+    /// Seen from behind; the same as `front` where the scene names one only.
+    pub back: Box<Bsdf>,
+}
+
+impl TwoSided {
+    /// Refuses models that let light through, which have two sides of their own.
+    pub fn new(front: Bsdf, back: Bsdf) -> Result<Self> {
+        if front.is_transmissive() || back.is_transmissive() {
+            return Err(Error::Request("twosided: the model within lets light through, expected an opaque one".into()));
+        }
+        Ok(Self { front: Box::new(front), back: Box::new(back) })
+    }
+
+    /// The model that `w` sees.
+    fn side(&self, w: Vec3) -> &Bsdf {
+        if w.z > 0.0 { &self.front } else { &self.back }
+    }
+}
+
+/// Direction `v` as the side that `w` sees has it: mirrored behind.
+fn towards(w: Vec3, v: Vec3) -> Vec3 {
+    if w.z > 0.0 { v } else { v.with_z(-v.z) }
+}
+
+impl Scatter for TwoSided {
+    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
+        self.side(wi).eval_pdf(s, towards(wi, wi), towards(wi, wo), query)
+    }
+
+    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
+        let sample = self.side(wi).sample(s, towards(wi, wi), u, v, query)?;
+        Some(BsdfSample { wo: towards(wi, sample.wo), ..sample })
+    }
+
+    fn lobes(&self) -> Lobes {
+        self.front.lobes() | self.back.lobes()
+    }
+
+    fn diffuse_out(&self, s: &Surface, wi: Vec3) -> Rgb {
+        self.side(wi).diffuse_out(s, towards(wi, wi))
+    }
+
+    fn diffuse_in(&self, s: &Surface, wo: Vec3) -> f32 {
+        self.side(wo).diffuse_in(s, towards(wo, wo))
+    }
+
+    fn diffuse_albedo(&self, s: &Surface, wi: Vec3) -> Rgb {
+        self.side(wi).diffuse_albedo(s, towards(wi, wi))
+    }
+
+    fn glossy_albedo(&self, s: &Surface, wi: Vec3, query: Query) -> Rgb {
+        self.side(wi).glossy_albedo(s, towards(wi, wi), query)
+    }
+
+    fn alpha(&self, s: &Surface) -> Option<f32> {
+        self.front.alpha(s).or_else(|| self.back.alpha(s))
+    }
+
+    fn is_two_sided(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,323 @@
+//! Frames by glossy probes on a device: the twin of [`crate::method::glossy_probes::renderer`]. A pass's data stays on the device; the layers come back.
+//!
+//! Probes are gathered from one after the other, so that a frame is right with memory for a single one.
+
+mod baseline;
+mod composite;
+mod coverage;
+mod filter;
+mod footprint;
+mod gather;
+mod gbuffer;
+mod image_space_gather;
+mod lightmap_rt;
+mod mirror;
+mod mirror_light;
+mod probes;
+mod ulr;
+mod view;
+
+pub use baseline::BaselineFrame;
+pub use filter::Filter;
+pub use image_space_gather::ImageSpaceGather;
+pub use lightmap_rt::LightmapRt;
+pub use ulr::Ulr;
+
+use super::GlossyProbeParams;
+use super::candidates::Candidates;
+use super::gather::Gathered;
+use super::renderer::{Buffers, Frame, nearest_probes};
+use crate::base::clock::Clock;
+use crate::gpu::Gpu;
+use crate::gpu::commands::Commands;
+use crate::gpu::kernel::{area, groups};
+use crate::gpu::scene::GpuScene;
+use crate::lightmap::LightMap;
+use crate::probe::file::Probe;
+use crate::probe::store::ProbeStore;
+use crate::scene::Camera;
+use crate::surface::CurvatureMap;
+use crate::transport::World;
+use crate::view::mirror_light::PERFECT;
+use crate::{Error, Result};
+use composite::{Composite, Layers};
+use coverage::Coverage;
+use filter::{Planes, Scratch};
+use footprint::Footprint;
+use gather::{Gather, Sums};
+use gbuffer::GBuffer;
+use glam::{Vec2, Vec4, Vec4Swizzles};
+use mirror::Mirror;
+use mirror_light::MirrorLight;
+use probes::{GpuProbe, Place, Resident};
+use std::sync::Arc;
+use view::{Guides, View};
+
+/// Stands for infinity in shaders.
+const FAR: f32 = f32::MAX;
+/// Edges of a workgroup, pixels.
+const WORKGROUP: [u32; 2] = [16, 4];
+
+/// First row and number of rows of parts of a picture that come to `most` steps, if each of its pixels takes `steps`; whole workgroups.
+fn bands([width, height]: [u32; 2], most: u64, steps: u64) -> impl Iterator<Item = (u32, u32)> {
+    const EDGE: u64 = 8;
+    let rows = most / (u64::from(width) * steps.max(1)).max(1) / EDGE * EDGE;
+    let rows = rows.clamp(EDGE, u64::from(height).max(EDGE)) as u32;
+    (0..height).step_by(rows as usize).map(move |first| (first, rows))
+}
+
+/// What `frame` bytes for frames of `size` leave of the memory. An error where that is less than a probe's bytes.
+fn room_for_probes(memory: u64, size: [u32; 2], frame: u64, probe: u64) -> Result<u64> {
+    if frame + probe > memory {
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        return Err(Error::Request(format!(
+            "--gpu-memory: frames of {}x{} take {} MiB and a probe {} MiB, but {} MiB are allowed; give more, or use --device cpu",
+            size[0],
+            size[1],
+            mib(frame),
+            mib(probe),
+            mib(memory)
+        )));
+    }
+    Ok(memory - frame)
+}
+
+/// The buffers of frames of one size.
+struct Target {
+    view: View,
+    /// The view of the frame before, and its camera.
+    last: Guides,
+    last_camera: Option<Camera>,
+    sums: Sums,
+    /// Colour and energy before the filter.
+    gathered: wgpu::Buffer,
+    covariances: wgpu::Buffer,
+    scratch: Scratch,
+    /// What perfect mirrors show.
+    mirrored: wgpu::Buffer,
+    /// Filtered; as long as nothing has been filtered, the frame's before.
+    glossy: wgpu::Buffer,
+    layers: Layers,
+}
+
+impl Target {
+    /// Bytes a sub-pixel, but for the layers and the anchors.
+    const BYTES: u64 = View::BYTES + 20 + 9 * 16;
+
+    fn new(gpu: &Gpu, size: [u32; 2], params: &GlossyProbeParams) -> Result<Self> {
+        let pixels = area(size);
+        Ok(Self {
+            view: View::new(gpu, size)?,
+            last: Guides::new(gpu, pixels)?,
+            last_camera: None,
+            sums: Sums::new(gpu, size, &params.gather)?,
+            gathered: gpu.output("gathered colours", 16 * pixels)?,
+            covariances: gpu.output("covariances", 16 * pixels)?,
+            scratch: Scratch::new(gpu, pixels)?,
+            mirrored: gpu.output("what mirrors show", 16 * pixels)?,
+            glossy: gpu.output("filtered colours", 16 * pixels)?,
+            layers: Layers::new(gpu, pixels / u64::from(params.supersample * params.supersample))?,
+        })
+    }
+}
+
+/// What stays the same from frame to frame.
+pub struct Renderer<'a> {
+    /// Whether frames come with their [`Buffers`].
+    pub inspect: bool,
+    gpu: Arc<Gpu>,
+    scene: GpuScene,
+    world: &'a World,
+    params: GlossyProbeParams,
+    roughness_scale: f32,
+    memory: u64,
+    gbuffer: GBuffer,
+    mirror: Mirror,
+    /// Where there is a light map to light mirrors by.
+    mirror_light: Option<MirrorLight>,
+    gather: Gather,
+    footprint: Option<Footprint>,
+    filter: Filter,
+    composite: Composite,
+    coverage: Option<Coverage>,
+    resident: Resident<GpuProbe>,
+    target: Option<Target>,
+}
+
+impl<'a> Renderer<'a> {
+    /// Compiles the passes; as [`crate::method::glossy_probes::renderer::Renderer::new`]. `memory` is what all of it may take on the device, bytes.
+    pub fn new(
+        gpu: Arc<Gpu>,
+        world: &'a World,
+        curvature: &CurvatureMap,
+        lightmap: Option<&LightMap>,
+        params: GlossyProbeParams,
+        roughness_scale: f32,
+        memory: u64,
+    ) -> Result<Self> {
+        let footprint = params.footprint.map(|f| {
+            let table = crate::method::glossy_probes::footprint::Footprint::new(&f.for_probes(roughness_scale));
+            Footprint::new(&gpu, &table)
+        });
+        let scene = GpuScene::lit(gpu.clone(), world, lightmap)?;
+        Ok(Self {
+            inspect: false,
+            world,
+            roughness_scale,
+            memory,
+            gbuffer: GBuffer::new(&scene, world, curvature)?,
+            mirror: Mirror::new(&scene)?,
+            mirror_light: (lightmap.is_some() && params.mirror_light).then(|| MirrorLight::new(&scene)).transpose()?,
+            coverage: match params.coverage.rays {
+                0 => None,
+                rays => Some(Coverage::new(&scene, rays)?),
+            },
+            scene,
+            gather: Gather::new(&gpu, &params.gather)?,
+            footprint: footprint.transpose()?,
+            filter: Filter::new(gpu.clone(), &params.filter)?,
+            composite: Composite::new(&gpu, params.supersample)?,
+            resident: Resident::new(0),
+            target: None,
+            params,
+            gpu,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        &self.gpu.adapter.name
+    }
+
+    /// Whether passes are timed by the device's own clock.
+    pub fn has_clock(&self) -> bool {
+        self.gpu.adapter.timestamps
+    }
+
+    /// Bytes of the probes on the device.
+    pub fn probe_bytes(&self) -> u64 {
+        self.resident.bytes()
+    }
+
+    /// Makes room for frames of `size` and for at least one probe of so many texels. An error where memory does not suffice.
+    pub fn reserve(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<()> {
+        self.target = Some(self.reserved(size, probe)?);
+        Ok(())
+    }
+
+    /// The buffers for frames of `size`, taken out.
+    fn reserved(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<Target> {
+        let fine = size.map(|s| s * self.params.supersample);
+        if let Some(target) = self.target.take().filter(|t| t.view.size == fine) {
+            return Ok(target);
+        }
+        let frame = area(fine) * Target::BYTES + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
+        self.resident.set_budget(room_for_probes(self.memory, size, frame, area(probe) * probes::TEXEL)?);
+        Target::new(&self.gpu, fine, &self.params)
+    }
+
+    /// Renders the next frame of a path; meanwhile probes are uploaded for the one after it, where there is `next`.
+    pub fn frame(&mut self, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
+        let (gpu, mut target) = (self.gpu.clone(), self.reserved(camera.size, probes.set.size)?);
+        let frame = gpu.checked(|| self.passes(&mut target, camera, next, probes))??;
+        self.target = Some(target);
+        Ok(frame)
+    }
+
+    fn passes(&mut self, t: &mut Target, camera: &Camera, next: Option<&Camera>, probes: &mut ProbeStore) -> Result<Frame> {
+        let (gpu, params, eye) = (&*self.gpu, &self.params, camera.position());
+        let fine = Camera { size: t.view.size, ..camera.clone() };
+        let albedos = params.gather.albedo_ratio.then_some(self.roughness_scale);
+        let mut clock = Clock::start();
+        let mut commands = Commands::new(gpu);
+
+        let mirror_light = self.mirror_light.as_ref().filter(|_| probes.set.mirrored);
+        let mirrors = mirror_light.is_some();
+        let wanted = albedos.or(mirrors.then_some(self.roughness_scale));
+        self.gbuffer.run(&self.scene, &mut commands, &fine, &t.view, wanted)?;
+        self.mirror.run(&self.scene, &mut commands, &fine, &t.view)?;
+        if let Some(mirror_light) = mirror_light {
+            mirror_light.run(&self.scene, &mut commands, (&fine, &t.view), (&PERFECT, PERFECT.max_alpha), &t.mirrored)?;
+        }
+        gpu.clear(&t.sums.sums);
+        self.resident.begin_frame();
+        let upload = |probe: &Probe| GpuProbe::upload(gpu, probe, &Candidates::new(self.world, probe, albedos, mirrors));
+        for (index, t_i) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
+            clock.restart();
+            let probe = probes.probe(index)?;
+            let there = self.resident.get(gpu, index, probes::bytes(&probe), || upload(&probe))?;
+            clock.lap("load");
+            let place = Place::new(index, &probe, params.gather.probe_weight(t_i));
+            self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &place), &t.sums)?;
+        }
+        let previous = (t.last_camera.as_ref(), &t.last, &t.glossy);
+        self.composite.fill(gpu, &mut commands, (&t.view, &fine, &t.gathered), &t.sums, previous, &t.layers)?;
+        match &self.footprint {
+            Some(footprint) => footprint.run(gpu, &mut commands, &fine, &t.view, &t.covariances)?,
+            None => gpu.clear(&t.covariances),
+        }
+        let (view, scratch) = (&t.view, &t.scratch);
+        let planes = Planes {
+            size: view.size,
+            guides: &view.guides,
+            gathered: &t.gathered,
+            covariances: &t.covariances,
+            scratch,
+            glossy: &t.glossy,
+        };
+        self.filter.run(&mut commands, &planes)?;
+        self.composite.layers(gpu, &mut commands, (view, &fine), (&t.glossy, mirrors.then_some(&t.mirrored)), &t.layers)?;
+        if let Some(coverage) = &self.coverage {
+            coverage.run(&self.scene, &mut commands, camera, (view, &t.glossy, mirrors), &t.layers)?;
+        }
+        clock.restart();
+        for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
+            // What fails here fails again when that frame is rendered.
+            if let Ok(probe) = probes.probe(index) {
+                self.resident.upload_ahead(gpu, index, probes::bytes(&probe), || upload(&probe))?;
+            }
+        }
+        clock.lap("load");
+        let passes = commands.finish()?;
+
+        clock.restart();
+        let ([emission, diffuse, glossy], unserved) = t.layers.read(gpu)?;
+        clock.lap("read");
+        let buffers = if self.inspect { Some(t.read(gpu)?) } else { None };
+        std::mem::swap(&mut t.view.guides, &mut t.last);
+        t.last_camera = Some(fine);
+        let passes = [clock.laps, passes].concat();
+        Ok(Frame { emission, diffuse, glossy, passes, unserved, buffers })
+    }
+}
+
+impl Target {
+    fn read(&self, gpu: &Gpu) -> Result<Buffers> {
+        let (colors, sums): (Vec<Vec4>, Vec<Vec4>) = (gpu.read(&self.gathered)?, gpu.read(&self.sums.sums)?);
+        let best: Vec<[u32; 4]> = gpu.read(&self.sums.best)?;
+        let gathered = |((c, s), b): ((&Vec4, &Vec4), &[u32; 4])| Gathered {
+            color: c.xyz(),
+            energy: if c.w < FAR { c.w } else { f32::INFINITY },
+            best: (s.w > 0.0).then(|| (b[3] as usize, Vec2::new(f32::from_bits(b[1]), f32::from_bits(b[2])))),
+        };
+        Ok(Buffers {
+            width: self.view.size[0] as usize,
+            curvature: gpu.read::<Vec4>(&self.view.curvatures)?.iter().map(|c| [c.x, c.y]).collect(),
+            reflected: self.view.read_reflected(gpu)?,
+            gathered: colors.iter().zip(&sums).zip(&best).map(gathered).collect(),
+            covariance: gpu.read::<Vec4>(&self.covariances)?.iter().map(|c| c.xyz().to_array()).collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_a_picture_once() {
+        assert_eq!(bands([960, 540], 1 << 26, 80).collect::<Vec<_>>(), [(0, 540)]);
+        let parts: Vec<_> = bands([100, 37], 1 << 10, 1).collect();
+        assert_eq!(parts.iter().map(|p| p.0).collect::<Vec<_>>(), [0, 8, 16, 24, 32]);
+    }
+}

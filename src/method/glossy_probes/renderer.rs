@@ -1,0 +1,282 @@
+//! One frame by glossy probe reprojection: the method's table of contents (§5, §6).
+
+use super::candidates::NearCandidates;
+use super::coverage::{CoverageParams, SubPixels, covered_pixels};
+use super::filter::{FilterInput, FilterParams, NOT_GLOSSY, filter};
+use super::footprint::{Footprint, FootprintParams, GlossyPoint};
+use super::gather::{GatherParams, Gathered, gather};
+use super::previous::{Previous, reproject_previous};
+use crate::Result;
+use crate::base::math::Rgb;
+use crate::lightmap::LightMap;
+use crate::probe::placement::{ProbeGrid, ProbeWeight};
+use crate::probe::store::ProbeStore;
+use crate::scene::Camera;
+use crate::surface::CurvatureMap;
+use crate::transport::World;
+use crate::view::composite::{diffuse_layer, downsample, emission_layer};
+use crate::view::gbuffer::{GBuffer, Pixel, gbuffer};
+use crate::view::mirror::{Reflected, mirror_pass};
+use crate::view::mirror_light::{add_mirrored, mirror_light_pass};
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// All parameters of the method at run time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlossyProbeParams {
+    /// N x N rays a pixel through all passes, averaged at the end.
+    pub supersample: u32,
+    /// §5.2.
+    pub gather: GatherParams,
+    /// Perfect mirrors take the light that the light map knows along the mirror ray, and the rest from probes. *Ours*; the paper takes
+    /// all from probes.
+    pub mirror_light: bool,
+    /// §6.1; `None` leaves the gathered colours unfiltered.
+    pub footprint: Option<FootprintParams>,
+    /// §6.2, §6.3.
+    pub filter: FilterParams,
+    /// Rays along edges.
+    pub coverage: CoverageParams,
+}
+
+impl Default for GlossyProbeParams {
+    fn default() -> Self {
+        Self {
+            supersample: 1,
+            gather: GatherParams::default(),
+            mirror_light: true,
+            footprint: Some(FootprintParams::default()),
+            filter: FilterParams::default(),
+            coverage: CoverageParams::default(),
+        }
+    }
+}
+
+impl GlossyProbeParams {
+    /// The paper's text in every choice.
+    pub fn paper() -> Self {
+        Self {
+            supersample: 1,
+            gather: GatherParams::paper(),
+            mirror_light: false,
+            footprint: Some(FootprintParams::paper()),
+            filter: FilterParams::paper(),
+            coverage: CoverageParams { rays: 0 },
+        }
+    }
+}
+
+/// A frame's layers, at its final size; their sum is the frame.
+pub struct Frame {
+    /// LE: emission seen directly, and the environment.
+    pub emission: Vec<Rgb>,
+    /// L(S|D)*DE from the light map.
+    pub diffuse: Vec<Rgb>,
+    /// L(S|D)*S+E from the probes.
+    pub glossy: Vec<Rgb>,
+    /// Milliseconds a pass, in order.
+    pub passes: Vec<(&'static str, f64)>,
+    /// Sub-pixels that no probe and no earlier frame served.
+    pub unserved: usize,
+    /// Where they were asked for.
+    pub buffers: Option<Buffers>,
+}
+
+/// Per-sub-pixel buffers of a frame, at `supersample` times its size, for inspection.
+pub struct Buffers {
+    /// Sub-pixels in a row.
+    pub width: usize,
+    /// Principal curvatures, 1/m.
+    pub curvature: Vec<[f32; 2]>,
+    /// Mirror hits.
+    pub reflected: Vec<Reflected>,
+    /// Before the filter.
+    pub gathered: Vec<Gathered>,
+    /// Footprint covariances, pixels².
+    pub covariance: Vec<[f32; 3]>,
+}
+
+/// What stays the same from frame to frame.
+pub struct Renderer<'a> {
+    /// The scene.
+    pub world: &'a World,
+    /// Curvatures of its vertices.
+    pub curvature: &'a CurvatureMap,
+    /// Its diffuse light; without it, the diffuse layer is black.
+    pub lightmap: Option<&'a LightMap>,
+    /// Parameters.
+    pub params: GlossyProbeParams,
+    /// Whether frames come with their [`Buffers`].
+    pub inspect: bool,
+    footprint: Option<Footprint>,
+    candidates: NearCandidates,
+    previous: Option<Previous>,
+}
+
+impl<'a> Renderer<'a> {
+    /// Tabulates the footprints (§6.1) that probes baked at `roughness_scale` leave to the filter ([`FootprintParams::for_probes`]).
+    pub fn new(
+        world: &'a World,
+        curvature: &'a CurvatureMap,
+        lightmap: Option<&'a LightMap>,
+        params: GlossyProbeParams,
+        roughness_scale: f32,
+    ) -> Self {
+        let footprint = params.footprint.map(|f| Footprint::new(&f.for_probes(roughness_scale)));
+        Self {
+            world,
+            curvature,
+            lightmap,
+            params,
+            inspect: false,
+            footprint,
+            candidates: NearCandidates::default(),
+            previous: None,
+        }
+    }
+
+    /// Renders the next frame of a path.
+    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+        let n = self.params.supersample;
+        let fine = Camera { size: camera.size.map(|s| s * n), ..camera.clone() };
+        let size = fine.size.map(|s| s as usize);
+        let mut clock = Clock::start();
+
+        let near: Vec<_> = nearest_probes(&probes.set.grid, camera.position(), self.params.gather.probes)
+            .into_iter()
+            .map(|(index, t)| Ok((index, probes.probe(index)?, self.params.gather.probe_weight(t))))
+            .collect::<Result<_>>()?;
+        let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
+        let roughness_scale = probes.set.roughness_scale;
+        let albedos = self.params.gather.albedo_ratio.then_some(roughness_scale);
+        let mirrors = self.lightmap.filter(|_| self.params.mirror_light && probes.set.mirrored);
+        let weighted = self.candidates.of(self.world, &near, albedos, mirrors.is_some());
+        clock.lap("load");
+        let view = Arc::new(gbuffer(self.world, self.curvature, &fine));
+        clock.lap("gbuffer");
+        let (reflected, mirrored) = match mirrors {
+            Some(map) => {
+                let (reflected, mirrored) = mirror_light_pass(self.world, map, &view);
+                (reflected, Some(mirrored))
+            }
+            None => (mirror_pass(self.world, &view), None),
+        };
+        clock.lap("mirror");
+        let mut gathered = gather(self.world, &view, &reflected, &weighted, roughness_scale, &self.params.gather);
+        let unserved = reproject_previous(&view, &mut gathered, self.previous.as_ref());
+        clock.lap("gather");
+        let covariance = match &self.footprint {
+            Some(footprint) => footprint_pass(footprint, &view, &reflected),
+            None => vec![[0.0; 3]; gathered.len()],
+        };
+        clock.lap("footprint");
+        let glossy = filter_pass(&view, &gathered, &covariance, &self.params.filter);
+        clock.lap("filter");
+        let diffuse = match self.lightmap {
+            Some(map) => diffuse_layer(&self.world.scene, &view, map),
+            None => vec![Rgb::ZERO; glossy.len()],
+        };
+        let emission = emission_layer(&view);
+        let whole = mirrored.as_ref().map(|mirrored| add_mirrored(&glossy, mirrored));
+        let mut layers =
+            [&emission, &diffuse, whole.as_ref().unwrap_or(&glossy)].map(|layer| downsample(layer, size, n as usize));
+        clock.lap("composite");
+        let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
+        for (i, c) in covered_pixels(self.world, self.lightmap, mirrored.is_some(), camera, &sub, &self.params.coverage) {
+            for (layer, value) in layers.iter_mut().zip([c.emission, c.diffuse, c.glossy]) {
+                layer[i] = value;
+            }
+        }
+        clock.lap("coverage");
+        let curvature = |p: &Option<Pixel>| p.as_ref().map_or([0.0; 2], |p| [p.curvature.k1, p.curvature.k2]);
+        let buffers = self.inspect.then(|| Buffers {
+            width: size[0],
+            curvature: view.pixels.iter().map(curvature).collect(),
+            reflected,
+            gathered,
+            covariance,
+        });
+        self.previous = Some(Previous { view, glossy });
+        let [emission, diffuse, glossy] = layers;
+        Ok(Frame { emission, diffuse, glossy, passes: clock.laps, unserved, buffers })
+    }
+}
+
+/// The eight probes nearest a camera with their trilinear weights (§5.2), or the `count` of largest weight.
+pub fn nearest_probes(grid: &ProbeGrid, eye: Vec3, count: usize) -> Vec<(usize, f32)> {
+    // At the border of the grid, and in a grid of one layer, corners coincide.
+    let mut merged: Vec<(usize, f32)> = Vec::with_capacity(8);
+    for ProbeWeight { probe, weight } in grid.around(eye) {
+        match merged.iter_mut().find(|(i, _)| *i == probe) {
+            Some((_, w)) => *w += weight,
+            None if grid.is_blocked(probe) => {}
+            None => merged.push((probe, weight)),
+        }
+    }
+    merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    merged.truncate(count.clamp(1, 8));
+    merged
+}
+
+/// Σ_I of every pixel (Eq. 3): what the probes' reduced roughness lacks, pixels².
+fn footprint_pass(footprint: &Footprint, view: &GBuffer, reflected: &[Reflected]) -> Vec<[f32; 3]> {
+    let of = |(pixel, reflected): (&Option<Pixel>, &Reflected)| {
+        let p = pixel.as_ref()?;
+        let (x, n) = (p.surface.p, p.normal);
+        let reflected_distance = reflected.distance_from(x);
+        let point = GlossyPoint { x, n, reflected_distance, alpha: p.alpha?, curvature: &p.curvature };
+        Some(footprint.covariance(&view.camera, &point))
+    };
+    let pixels = view.pixels.par_iter().zip(reflected).with_min_len(view.size()[0]);
+    pixels.map(|p| of(p).unwrap_or([0.0; 3])).collect()
+}
+
+/// The glossy filter (§6.2) over a view's gathered colours.
+pub fn filter_pass(view: &GBuffer, gathered: &[Gathered], covariance: &[[f32; 3]], params: &FilterParams) -> Vec<Rgb> {
+    let [width, height] = view.size();
+    let pixels = || view.pixels.par_iter().map(Option::as_ref);
+    let material = |p: Option<&Pixel>| p.filter(|p| p.alpha.is_some()).map_or(NOT_GLOSSY, |p| p.surface.material);
+    let input = FilterInput {
+        width,
+        height,
+        color: &gathered.par_iter().map(|g| g.color).collect::<Vec<_>>(),
+        normal: &pixels().map(|p| p.map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
+        depth: &pixels().map(|p| p.map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
+        material: &pixels().map(material).collect::<Vec<_>>(),
+        covariance,
+        energy: &gathered.par_iter().map(|g| g.energy).collect::<Vec<_>>(),
+    };
+    filter(&input, params)
+}
+
+/// Milliseconds of one pass after the other.
+pub(crate) struct Clock {
+    last: Instant,
+    pub(crate) laps: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    pub(crate) fn start() -> Self {
+        Self { last: Instant::now(), laps: Vec::new() }
+    }
+
+    /// Leaves out what happened since the last lap.
+    pub(crate) fn restart(&mut self) {
+        self.last = Instant::now();
+    }
+
+    /// Notes what has passed since the last lap, added to what `pass` took before.
+    pub(crate) fn lap(&mut self, pass: &'static str) {
+        let now = Instant::now();
+        let ms = (now - self.last).as_secs_f64() * 1e3;
+        match self.laps.iter_mut().find(|(name, _)| *name == pass) {
+            Some((_, sum)) => *sum += ms,
+            None => self.laps.push((pass, ms)),
+        }
+        self.last = now;
+    }
+}

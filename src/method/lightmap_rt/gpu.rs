@@ -1,0 +1,116 @@
+//! Rays along the glossy lobes, lit by the light map: the twin of [`crate::method::lightmap_rt`].
+
+use super::LightmapRtParams;
+use crate::Result;
+use crate::gpu::Gpu;
+use crate::gpu::camera::GpuCamera;
+use crate::gpu::commands::Commands;
+use crate::gpu::follow::{Follow, PathStart, Place, Purpose, SampleSum, WORKGROUP, most_starts};
+use crate::gpu::kernel::{Kernel, shader};
+use crate::gpu::pace::Pace;
+use crate::gpu::scene::{MATERIALS, RAYS};
+use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
+use crate::lightmap::LightMap;
+use crate::scene::Camera;
+use crate::transport::World;
+use crate::view::glossy::GLOSSY;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+/// `Params` of lightmap_rt.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    camera: GpuCamera,
+    seed: u32,
+    frame: u32,
+    first_pixel: u32,
+    pixels: u32,
+    samples: u32,
+    padding: [u32; 3],
+}
+
+fn source() -> String {
+    [RAYS, MATERIALS, shader!("camera", "camera_ray", "view", "start", "lightmap_rt")].concat()
+}
+
+/// Renders frames on a device.
+pub struct LightmapRt {
+    baseline: Baseline,
+    starts: Kernel,
+    follow: Follow,
+    mean: Kernel,
+    pace: Pace,
+}
+
+impl LightmapRt {
+    /// Compiles the passes. Of `params` all count but the samples.
+    pub fn new(gpu: Arc<Gpu>, world: &World, lightmap: &LightMap, params: &LightmapRtParams) -> Result<Self> {
+        let baseline = Baseline::new(gpu.clone(), world, lightmap, params.supersample)?;
+        let purpose = if params.next_event { Purpose::Scattering(GLOSSY) } else { Purpose::Rays(GLOSSY) };
+        let place = Place { branch: None, first_set: 0 };
+        Ok(Self {
+            starts: Kernel::new(&gpu, &source(), "view_starts")?,
+            follow: Follow::new(baseline.scene.clone(), &params.path(), purpose, place)?,
+            mean: Kernel::new(&gpu, &source(), "mean_light")?,
+            pace: Pace::new(4096),
+            baseline,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        self.baseline.scene.device()
+    }
+
+    /// A frame with the glossy layer of [`crate::method::lightmap_rt::lightmap_rt`], of so many samples a pixel. Its passes are
+    /// timed by the host's clock.
+    pub fn frame(&mut self, camera: &Camera, samples: u32, seed: u32, frame: u32) -> Result<BaselineFrame> {
+        let Self { baseline, starts, follow, mean, pace } = self;
+        let scene = baseline.scene.clone();
+        let gpu = &*scene.gpu;
+        let fill = |commands: &mut Commands, camera: &Camera, target: &Target| {
+            let pixels = (camera.size[0] * camera.size[1]) as usize;
+            let mut pixel = 0;
+            while pixel < pixels {
+                let run = (pace.pieces() / samples.max(1) as usize).clamp(1, most_starts(&scene)).min(pixels - pixel);
+                let params = Params {
+                    camera: camera.into(),
+                    seed,
+                    frame,
+                    first_pixel: pixel as u32,
+                    pixels: run as u32,
+                    samples,
+                    padding: [0; 3],
+                };
+                let params = gpu.upload("the rays' parameters", bytemuck::bytes_of(&params))?;
+                let list = gpu.output("starts of rays", (run * size_of::<PathStart>()) as u64)?;
+                let sums = gpu.output("sums over rays", (run * size_of::<SampleSum>()) as u64)?;
+                let groups = [run.div_ceil(WORKGROUP) as u32, 1];
+                let view = &target.view;
+                commands.run("rays", starts, &[&params, &view.hits, &view.guides.materials, &list], groups);
+                let mut done = 0;
+                while done < samples {
+                    let more = ((pace.pieces() / run).max(1) as u32).min(samples - done);
+                    pace.run(run * more as usize, || follow.run((commands, "rays"), &list, &sums, run, [done, more]))?;
+                    done += more;
+                }
+                commands.run("rays", mean, &[&params, &sums, &target.glossy], groups);
+                pixel += run;
+            }
+            Ok(())
+        };
+        baseline.frame(camera, false, Commands::by_host(gpu), fill)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::layout::check;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(&source(), Params as "Params" { camera, seed, frame, first_pixel, pixels, samples });
+    }
+}

@@ -1,0 +1,213 @@
+//! The denoiser of path-traced frames: the twin of [`crate::method::path_trace::denoise`].
+
+use super::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, MOST_LEVELS, NEIGHBOURS};
+use crate::Result;
+use crate::base::math::Rgb;
+use crate::gpu::Gpu;
+use crate::gpu::camera::GpuCamera;
+use crate::gpu::kernel::{Kernel, area, groups, shader};
+use crate::gpu::scene::{GpuScene, MATERIALS, RAYS};
+use crate::scene::Camera;
+use crate::view::layers::LayerImages;
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec3, Vec4, Vec4Swizzles};
+use std::sync::Arc;
+
+/// Edges of a workgroup of camera rays, and of the filter's, pixels.
+const RAYS_GROUP: [u32; 2] = [8, 8];
+const FILTER_GROUP: [u32; 2] = [16, 4];
+
+/// `GuideParams` of guides.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct GuideParams {
+    camera: GpuCamera,
+    seed: u32,
+    frame: u32,
+    index: u32,
+    count: u32,
+    mirror_alpha: f32,
+    padding: [u32; 3],
+}
+
+/// `Params` of denoise.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    width: u32,
+    height: u32,
+    step: i32,
+    despeckle: u32,
+    luminance_sigma: f32,
+    normal_power: f32,
+    depth_sigma: f32,
+    albedo_sigma: f32,
+}
+
+/// `Guide` of guide.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct GpuGuide {
+    normal: [f32; 3],
+    depth: f32,
+    albedo: [f32; 3],
+    padding0: u32,
+    factor: [f32; 3],
+    padding1: u32,
+}
+
+impl From<&Guide> for GpuGuide {
+    fn from(guide: &Guide) -> Self {
+        let Guide { normal, depth, albedo, factor } = *guide;
+        let [normal, albedo, factor] = [normal, albedo, factor].map(|v| v.to_array());
+        Self { normal, depth, albedo, padding0: 0, factor, padding1: 0 }
+    }
+}
+
+impl From<&GpuGuide> for Guide {
+    fn from(guide: &GpuGuide) -> Self {
+        let [normal, albedo, factor] = [guide.normal, guide.albedo, guide.factor].map(Vec3::from_array);
+        Self { normal, depth: guide.depth, albedo, factor }
+    }
+}
+
+fn guides_source() -> String {
+    [RAYS, MATERIALS, shader!("camera", "camera_ray", "view", "mirror", "guide", "guides")].concat()
+}
+
+/// Guides of the diffuse and of the glossy layer, on a device.
+pub struct GpuGuides {
+    size: [u32; 2],
+    layers: [wgpu::Buffer; 2],
+}
+
+impl GpuGuides {
+    /// Uploads guides of frames so many pixels wide.
+    pub fn upload(gpu: &Gpu, guides: &[Vec<Guide>; 2], width: usize) -> Result<Self> {
+        let size = [width as u32, (guides[0].len() / width.max(1)) as u32];
+        let upload = |guides: &[Guide]| {
+            let guides: Vec<GpuGuide> = guides.iter().map(GpuGuide::from).collect();
+            gpu.upload("the denoiser's guides", bytemuck::cast_slice(&guides))
+        };
+        Ok(Self { size, layers: [upload(&guides[0])?, upload(&guides[1])?] })
+    }
+}
+
+/// The denoiser's own kernels.
+struct Filter {
+    start: Kernel,
+    despeckle: Kernel,
+    variance: Kernel,
+    level: Kernel,
+    end: Kernel,
+}
+
+/// The denoiser on a device.
+pub struct Denoiser {
+    scene: Arc<GpuScene>,
+    params: DenoiseParams,
+    guides: Kernel,
+    filter: Filter,
+}
+
+impl Denoiser {
+    /// Compiles it.
+    pub fn new(scene: Arc<GpuScene>, params: &DenoiseParams) -> Result<Self> {
+        let kernel = |entry| Kernel::new(&scene.gpu, shader!("math", "guide", "denoise"), entry);
+        let filter = Filter {
+            start: kernel("denoise_start")?,
+            despeckle: kernel("despeckle")?,
+            variance: kernel("with_variance")?,
+            level: kernel("smooth_level")?,
+            end: kernel("denoise_end")?,
+        };
+        let guides = Kernel::in_scene(&scene, &guides_source(), "add_guides", [1, 2], &[])?;
+        Ok(Self { guides, filter, params: *params, scene })
+    }
+
+    /// The guides of a frame, as [`crate::method::path_trace::denoise::guides`] has them; a dispatch for each of a pixel's rays.
+    pub fn guides(&self, camera: &Camera, spp: u32, seed: u32, frame: u32) -> Result<GpuGuides> {
+        let gpu = &self.scene.gpu;
+        let bytes = area(camera.size) * size_of::<GpuGuide>() as u64;
+        let guides = GpuGuides {
+            size: camera.size,
+            layers: [gpu.output("the diffuse layer's guides", bytes)?, gpu.output("the glossy layer's guides", bytes)?],
+        };
+        let count = spp.clamp(1, GUIDE_SAMPLES);
+        for index in 0..count {
+            let mirror_alpha = self.params.mirror_alpha;
+            let params = GuideParams { camera: camera.into(), seed, frame, index, count, mirror_alpha, padding: [0; 3] };
+            let params = gpu.upload("the guides' parameters", bytemuck::bytes_of(&params))?;
+            let [diffuse, glossy] = &guides.layers;
+            gpu.dispatch(&self.guides, &[&params, diffuse, glossy], groups(camera.size, RAYS_GROUP))?;
+        }
+        Ok(guides)
+    }
+
+    /// Brings guides back that were made here.
+    pub fn read(&self, guides: &GpuGuides) -> Result<[Vec<Guide>; 2]> {
+        let read = |layer| Ok::<_, crate::Error>(self.scene.gpu.read::<GpuGuide>(layer)?.iter().map(Guide::from).collect());
+        Ok([read(&guides.layers[0])?, read(&guides.layers[1])?])
+    }
+
+    /// The filtered layers, as [`crate::method::path_trace::denoise::denoise`] has them.
+    pub fn denoise(&self, layers: &LayerImages, guides: &GpuGuides) -> Result<LayerImages> {
+        let [diffuse, glossy] = &guides.layers;
+        Ok(LayerImages {
+            emission: layers.emission.clone(),
+            diffuse: self.filter_layer(&layers.diffuse, diffuse, guides.size)?,
+            glossy: self.filter_layer(&layers.glossy, glossy, guides.size)?,
+        })
+    }
+
+    fn filter_layer(&self, layer: &[Rgb], guides: &wgpu::Buffer, size: [u32; 2]) -> Result<Vec<Rgb>> {
+        if layer.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (gpu, filter) = (&self.scene.gpu, &self.filter);
+        let pixels = layer.len() as u64;
+        let plane = || gpu.output("a denoised layer", 16 * pixels);
+        let (mut from, mut to) = (plane()?, plane()?);
+        let slopes = gpu.output("slopes", 8 * pixels)?;
+        let run = |kernel: &Kernel, step: i32, buffers: [&wgpu::Buffer; 2], slopes: Option<&wgpu::Buffer>| {
+            let params = gpu.upload("the denoiser's parameters", bytemuck::bytes_of(&self.kernel_params(size, step)))?;
+            let buffers: Vec<_> = [&params, guides].into_iter().chain(buffers).chain(slopes).collect();
+            gpu.dispatch(kernel, &buffers, groups(size, FILTER_GROUP))
+        };
+        let layer: Vec<Vec4> = layer.iter().map(|c| c.extend(0.0)).collect();
+        let layer = gpu.upload("a layer", bytemuck::cast_slice(&layer))?;
+        run(&filter.start, 1, [&layer, &from], Some(&slopes))?;
+        if (1..=NEIGHBOURS).contains(&self.params.despeckle) {
+            run(&filter.despeckle, 1, [&from, &to], None)?;
+            std::mem::swap(&mut from, &mut to);
+        }
+        run(&filter.variance, 1, [&from, &to], Some(&slopes))?;
+        for level in 0..self.params.levels.min(MOST_LEVELS) {
+            std::mem::swap(&mut from, &mut to);
+            run(&filter.level, 1 << level, [&from, &to], Some(&slopes))?;
+        }
+        run(&filter.end, 1, [&to, &from], None)?;
+        Ok(gpu.read::<Vec4>(&from)?.iter().map(|c| c.xyz()).collect())
+    }
+
+    fn kernel_params(&self, [width, height]: [u32; 2], step: i32) -> Params {
+        let DenoiseParams { luminance_sigma, normal_power, depth_sigma, albedo_sigma, despeckle, .. } = self.params;
+        Params { width, height, step, despeckle, luminance_sigma, normal_power, depth_sigma, albedo_sigma }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::layout::check;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shaders() {
+        check!(&guides_source(), GuideParams as "GuideParams" { camera, seed, frame, index, count, mirror_alpha });
+        let source = shader!("math", "guide", "denoise");
+        check!(source, GpuGuide as "Guide" { normal, depth, albedo, factor });
+        check!(source, Params as "Params" {
+            width, height, step, despeckle, luminance_sigma, normal_power, depth_sigma, albedo_sigma
+        });
+    }
+}

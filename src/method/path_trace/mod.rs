@@ -1,0 +1,111 @@
+//! Path-traced frames: emission, diffuse and glossy layers in one pass, or the full image by one path a sample.
+//!
+//! A box filter: each pixel is the mean of samples spread over its own square (Owen-scrambled Sobol).
+//! In: world, camera. Out: linear radiance a layer; their sum is the full image.
+
+use crate::base::math::{Rgb, hash_words};
+use crate::base::progress::Progress;
+use crate::base::ray::Ray;
+use crate::scene::Camera;
+use crate::transport::path::{Layers, PathParams, radiance, trace_layers};
+use crate::transport::{Sampler, World};
+use glam::{DVec3, Vec2};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Samples and depth of a path-traced frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathTraceParams {
+    /// Samples a pixel.
+    pub spp: u32,
+    /// Depth and termination.
+    pub path: PathParams,
+}
+
+impl Default for PathTraceParams {
+    fn default() -> Self {
+        Self { spp: 64, path: PathParams::default() }
+    }
+}
+
+/// The layers of a frame, rows from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayerImages {
+    /// LE.
+    pub emission: Vec<Rgb>,
+    /// L(S|D)*DE.
+    pub diffuse: Vec<Rgb>,
+    /// L(S|D)*S+E.
+    pub glossy: Vec<Rgb>,
+}
+
+impl LayerImages {
+    /// The full image.
+    pub fn full(&self) -> Vec<Rgb> {
+        self.emission.iter().zip(&self.diffuse).zip(&self.glossy).map(|((&e, &d), &g)| e + d + g).collect()
+    }
+}
+
+/// Renders the full image of frame number `frame`, without a split: half as many paths as [`path_trace`], noisier.
+pub fn path_trace_full(
+    world: &World,
+    camera: &Camera,
+    params: &PathTraceParams,
+    seed: u32,
+    frame: u32,
+    progress: &dyn Progress,
+) -> Vec<Rgb> {
+    let sample = |ray: &Ray, sampler: &mut Sampler| [radiance(world, ray, &params.path, sampler)];
+    image(camera, params.spp, seed, frame, &sample, progress).into_iter().map(|[full]| full).collect()
+}
+
+/// Renders frame number `frame` of a path from `camera`. Advances `progress` by one a row; start and finish are the caller's.
+pub fn path_trace(
+    world: &World,
+    camera: &Camera,
+    params: &PathTraceParams,
+    seed: u32,
+    frame: u32,
+    progress: &dyn Progress,
+) -> LayerImages {
+    let sample = |ray: &Ray, sampler: &mut Sampler| {
+        let Layers { emission, diffuse, glossy } = trace_layers(world, ray, &params.path, sampler);
+        [emission, diffuse, glossy]
+    };
+    let pixels = image(camera, params.spp, seed, frame, &sample, progress);
+    let layer = |k: usize| pixels.iter().map(|p| p[k]).collect();
+    LayerImages { emission: layer(0), diffuse: layer(1), glossy: layer(2) }
+}
+
+/// Means of `N` quantities over the samples of every pixel.
+fn image<const N: usize>(
+    camera: &Camera,
+    spp: u32,
+    seed: u32,
+    frame: u32,
+    sample: &(dyn Fn(&Ray, &mut Sampler) -> [Rgb; N] + Sync),
+    progress: &dyn Progress,
+) -> Vec<[Rgb; N]> {
+    let [width, height] = camera.size;
+    let pixel = |x: u32, y: u32| {
+        let stream = hash_words(&[seed, frame, y * width + x]);
+        let corner = Vec2::new(x as f32, y as f32);
+        let mut sums = [DVec3::ZERO; N];
+        for index in 0..spp {
+            let mut sampler = Sampler::new(stream, index);
+            let [dx, dy, lens_x, lens_y] = sampler.next_4d();
+            let ray = camera.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y));
+            for (sum, value) in sums.iter_mut().zip(sample(&ray, &mut sampler)) {
+                *sum += value.as_dvec3();
+            }
+        }
+        sums.map(|s| (s / f64::from(spp.max(1))).as_vec3())
+    };
+    let row = |y: u32| -> Vec<[Rgb; N]> {
+        let pixels = (0..width).map(|x| pixel(x, y)).collect();
+        progress.advance(1);
+        pixels
+    };
+    (0..height).into_par_iter().map(row).collect::<Vec<_>>().concat()
+}

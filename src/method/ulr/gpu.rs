@@ -1,0 +1,212 @@
+//! Unstructured lumigraph rendering, a dispatch a probe: the twin of [`crate::method::ulr`].
+
+use super::{UlrParams, nearest};
+use crate::Result;
+use crate::base::clock::Clock;
+use crate::gpu::Gpu;
+use crate::gpu::commands::Commands;
+use crate::gpu::kernel::{Kernel, area, groups, shader};
+use crate::gpu::resident::{Place, Resident, room_for_probes};
+use crate::gpu::scene::{GpuScene, RAYS};
+use crate::gpu::view::View;
+use crate::gpu::view::composite::{Composite, Layers};
+use crate::gpu::view::gbuffer::GBuffer;
+use crate::lightmap::LightMap;
+use crate::method::glossy_probes::renderer::Frame;
+use crate::probe::file::{Probe, Texel};
+use crate::probe::store::ProbeStore;
+use crate::scene::Camera;
+use crate::surface::CurvatureMap;
+use crate::transport::World;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+/// Edges of a workgroup, pixels.
+const WORKGROUP: [u32; 2] = [8, 8];
+/// Bytes of a sample that a pixel keeps, and of how many these are.
+const SAMPLE: u64 = 16;
+const COUNTS: u64 = 8;
+
+/// `UlrParams` of ulr.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    eye: [f32; 3],
+    width: u32,
+    height: u32,
+    blend: u32,
+    angle: f32,
+    resolution: f32,
+    hidden: f32,
+    plane_tolerance: f32,
+    padding: [u32; 2],
+}
+
+fn source() -> String {
+    [RAYS, shader!("view", "probe", "ulr")].concat()
+}
+
+/// A probe as its file has it.
+struct GpuProbe {
+    forward: wgpu::Buffer,
+    texels: wgpu::Buffer,
+}
+
+impl GpuProbe {
+    fn upload(gpu: &Gpu, probe: &Probe) -> Result<Self> {
+        Ok(Self {
+            forward: gpu.upload("a probe's map", bytemuck::cast_slice(&probe.map.forward))?,
+            texels: gpu.upload("a probe's texels", bytemuck::cast_slice(&probe.texels))?,
+        })
+    }
+
+    fn bytes(probe: &Probe) -> u64 {
+        (size_of_val(probe.map.forward.as_slice()) + size_of_val(probe.texels.as_slice())) as u64
+    }
+}
+
+/// The buffers of frames of one size.
+struct Target {
+    view: View,
+    /// The samples of least penalty, so many a pixel.
+    kept: wgpu::Buffer,
+    counts: wgpu::Buffer,
+    glossy: wgpu::Buffer,
+    layers: Layers,
+}
+
+/// The method on a device.
+pub struct Ulr {
+    gpu: Arc<Gpu>,
+    scene: GpuScene,
+    params: UlrParams,
+    memory: u64,
+    gbuffer: GBuffer,
+    look: Kernel,
+    blend: Kernel,
+    composite: Composite,
+    resident: Resident<GpuProbe>,
+    target: Option<Target>,
+}
+
+impl Ulr {
+    /// Compiles the passes. Without a light map the diffuse layer is black. `memory` is what all of it may take on the device, bytes.
+    pub fn new(gpu: Arc<Gpu>, world: &World, lightmap: Option<&LightMap>, params: &UlrParams, memory: u64) -> Result<Self> {
+        let scene = GpuScene::lit(gpu.clone(), world, lightmap)?;
+        let flat = CurvatureMap::flat(world.scene.geometry.positions.len());
+        Ok(Self {
+            gbuffer: GBuffer::new(&scene, world, &flat)?,
+            look: Kernel::in_scene(&scene, &source(), "ulr_look", [7, 2], &[])?,
+            blend: Kernel::new(&gpu, &source(), "ulr_blend")?,
+            composite: Composite::new(&gpu, params.supersample)?,
+            resident: Resident::new(0),
+            target: None,
+            params: UlrParams { blend: params.blend.max(1), ..*params },
+            memory,
+            scene,
+            gpu,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        &self.gpu.adapter.name
+    }
+
+    /// Whether passes are timed by the device's own clock.
+    pub fn has_clock(&self) -> bool {
+        self.gpu.adapter.timestamps
+    }
+
+    /// Makes room for frames of `size` and for at least one probe of so many texels. An error where memory does not suffice.
+    pub fn reserve(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<()> {
+        self.target = Some(self.reserved(size, probe)?);
+        Ok(())
+    }
+
+    /// The buffers for frames of `size`, taken out.
+    fn reserved(&mut self, size: [u32; 2], probe: [u32; 2]) -> Result<Target> {
+        let fine = size.map(|s| s * self.params.supersample);
+        if let Some(target) = self.target.take().filter(|t| t.view.size == fine) {
+            return Ok(target);
+        }
+        let kept = SAMPLE * u64::from(self.params.blend);
+        let a_sub_pixel = View::BYTES + kept + COUNTS + 16;
+        let frame = area(fine) * a_sub_pixel + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
+        self.resident.set_budget(room_for_probes(self.memory, size, frame, area(probe) * size_of::<Texel>() as u64)?);
+        let gpu = &self.gpu;
+        Ok(Target {
+            view: View::new(gpu, fine)?,
+            kept: gpu.output("the samples that pixels blend", area(fine) * kept)?,
+            counts: gpu.output("their numbers", area(fine) * COUNTS)?,
+            glossy: gpu.output("blended colours", area(fine) * 16)?,
+            layers: Layers::new(gpu, area(size))?,
+        })
+    }
+
+    /// Renders a frame.
+    pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+        let (gpu, target) = (self.gpu.clone(), self.reserved(camera.size, probes.set.size)?);
+        let frame = gpu.checked(|| self.passes(&target, camera, probes))??;
+        self.target = Some(target);
+        Ok(frame)
+    }
+
+    fn passes(&mut self, t: &Target, camera: &Camera, probes: &mut ProbeStore) -> Result<Frame> {
+        let (gpu, view, eye) = (&*self.gpu, &t.view, camera.position());
+        let fine = Camera { size: view.size, ..camera.clone() };
+        let groups = groups(view.size, WORKGROUP);
+        let mut clock = Clock::start();
+        let mut commands = Commands::new(gpu);
+
+        self.gbuffer.run(&self.scene, &mut commands, &fine, view, None)?;
+        gpu.clear(&t.counts);
+        gpu.clear(&t.layers.unserved);
+        let params = gpu.upload("the parameters of ulr", bytemuck::bytes_of(&self.kernel_params(eye.to_array(), view.size)))?;
+        let is_baked = |i: usize| !probes.set.files[i].is_empty();
+        let materials = &view.guides.materials;
+        for index in nearest(&probes.set.grid, eye, self.params.probes as usize, is_baked) {
+            clock.restart();
+            let probe = probes.probe(index)?;
+            let there = self.resident.get(gpu, index, GpuProbe::bytes(&probe), || GpuProbe::upload(gpu, &probe))?;
+            clock.lap("load");
+            let place = gpu.upload("a probe's place", bytemuck::bytes_of(&Place::new(index, &probe, 1.0)))?;
+            let GpuProbe { forward, texels } = &*there;
+            let buffers = [&params, &place, forward, texels, &view.hits, &view.positions, materials, &t.kept, &t.counts];
+            commands.run("gather", &self.look, &buffers, groups);
+        }
+        let buffers = [&params, materials, &t.kept, &t.counts, &t.glossy, &t.layers.unserved];
+        commands.run("gather", &self.blend, &buffers, groups);
+        self.composite.layers(gpu, &mut commands, (view, &fine), (&t.glossy, None), &t.layers)?;
+        let passes = commands.finish()?;
+
+        clock.restart();
+        let ([emission, diffuse, glossy], unserved) = t.layers.read(gpu)?;
+        clock.lap("read");
+        Ok(Frame { emission, diffuse, glossy, passes: [clock.laps, passes].concat(), unserved, buffers: None })
+    }
+
+    fn kernel_params(&self, eye: [f32; 3], [width, height]: [u32; 2]) -> Params {
+        let UlrParams { blend, angle, resolution, hidden, plane_tolerance, .. } = self.params;
+        Params { eye, width, height, blend, angle, resolution, hidden, plane_tolerance, padding: [0; 2] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::layout::check;
+    use std::mem::offset_of;
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shader() {
+        check!(&source(), Params as "UlrParams" {
+            eye, width, height, blend, angle, resolution, hidden, plane_tolerance
+        });
+        assert_eq!(size_of::<Texel>(), 7 * 4);
+        assert_eq!(
+            [offset_of!(Texel, glossy), offset_of!(Texel, barycentric), offset_of!(Texel, triangle)],
+            [0, 3 * 4 + 2, 6 * 4]
+        );
+    }
+}
