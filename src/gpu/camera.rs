@@ -1,5 +1,6 @@
 //! The camera as kernels read it.
 
+use super::spec::{StructLayout, layout};
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
 
@@ -19,6 +20,10 @@ pub(crate) struct GpuCamera {
     padding: [u32; 3],
 }
 
+pub(crate) const CAMERA: StructLayout = layout!(GpuCamera as "Camera" {
+    x, focal_px, y, aperture_radius, z, focus_distance, position, width, height
+});
+
 impl From<&Camera> for GpuCamera {
     fn from(camera: &Camera) -> Self {
         let [x, y, z] = camera.to_world.matrix3.to_cols_array_2d();
@@ -34,19 +39,5 @@ impl From<&Camera> for GpuCamera {
             height: camera.size[1],
             padding: [0; 3],
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::kernel::shader;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(shader!("camera"), GpuCamera as "Camera" {
-            x, focal_px, y, aperture_radius, z, focus_distance, position, width, height
-        });
     }
 }

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Smallest derivative that [`ParameterMap::search_scale`] divides by, lat-long texels per texel.
-const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
+pub(crate) const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
 
 /// Parameters of the parameterisation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
