@@ -101,11 +101,14 @@ pub fn hash64(mut x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
+/// 2^64 over the golden ratio.
+pub(crate) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// Hash of a sequence of words; the random stream of (seed, probe, texel, ...) starts here.
 pub fn hash_words(words: &[u32]) -> u32 {
-    let mut h = 0x9e37_79b9_7f4a_7c15u64;
+    let mut h = GOLDEN;
     for &w in words {
-        h = hash64(h ^ u64::from(w)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        h = hash64(h ^ u64::from(w)).wrapping_add(GOLDEN);
     }
     (hash64(h) >> 32) as u32
 }

@@ -31,8 +31,8 @@ impl<'a> Commands<'a> {
         Self { gpu, queries: None, runs: Vec::new() }
     }
 
-    /// Runs a kernel on `groups` workgroups, as part of `pass`.
-    pub(crate) fn run(&mut self, pass: &'static str, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 2]) {
+    /// Runs a kernel on `size` invocations, as part of `pass`.
+    pub(crate) fn run(&mut self, pass: &'static str, kernel: &Kernel, buffers: &[&wgpu::Buffer], size: [u32; 2]) {
         let number = self.runs.len() as u32;
         let timed = self.queries.as_ref().filter(|_| number < MOST_TIMED);
         let writes = timed.map(|query_set| wgpu::ComputePassTimestampWrites {
@@ -44,7 +44,7 @@ impl<'a> Commands<'a> {
             self.gpu.wait();
         }
         let start = Instant::now();
-        self.gpu.submit(kernel, buffers, groups, writes);
+        self.gpu.submit(kernel, buffers, size, writes);
         let mut ms = 0.0;
         if timed.is_none() {
             self.gpu.wait();

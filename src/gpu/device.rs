@@ -107,18 +107,49 @@ pub fn adapters() -> Vec<Adapter> {
     found().iter().map(Adapter::of).collect()
 }
 
+/// Whether kernels in a scene test every index and bound every loop: some per cent of a path's time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Checks {
+    /// They do.
+    On,
+    /// They trust what this crate has written.
+    Off,
+}
+
+impl Checks {
+    /// The environment's variable.
+    pub const VARIABLE: &str = "REPROBE_GPU_CHECKS";
+
+    /// What [`Self::VARIABLE`] says, `on` or `off`; without it, on in builds with debug assertions alone.
+    pub fn of_environment() -> Result<Self> {
+        match std::env::var(Self::VARIABLE).as_deref() {
+            Ok("on") => Ok(Self::On),
+            Ok("off") => Ok(Self::Off),
+            Ok(other) => Err(Error::Request(format!("{}: expected on or off, found \"{other}\"", Self::VARIABLE))),
+            Err(_) if cfg!(debug_assertions) => Ok(Self::On),
+            Err(_) => Ok(Self::Off),
+        }
+    }
+}
+
 /// A device, open.
 pub struct Gpu {
     /// Its adapter.
     pub adapter: Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
+    pub(crate) checks: Checks,
     lost: Arc<Mutex<Option<String>>>,
 }
 
 impl Gpu {
-    /// Opens what `choice` asks for; `None` for the CPU.
+    /// Opens what `choice` asks for; `None` for the CPU. Kernels have the [`Checks`] of the environment.
     pub fn open(choice: &Choice) -> Result<Option<Self>> {
+        Self::open_with(choice, Checks::of_environment()?)
+    }
+
+    /// The same with these checks.
+    pub fn open_with(choice: &Choice, checks: Checks) -> Result<Option<Self>> {
         if *choice == Choice::Cpu {
             return Ok(None);
         }
@@ -128,7 +159,7 @@ impl Gpu {
             _ => is_gpu(a.get_info().device_type),
         };
         match list.iter().find(|a| wanted(a)) {
-            Some(adapter) => Self::on(adapter).map(Some),
+            Some(adapter) => Self::on(adapter, checks).map(Some),
             None if *choice == Choice::Auto => Ok(None),
             None => {
                 let names: Vec<String> = list.iter().map(|a| format!("\"{}\"", a.get_info().name)).collect();
@@ -143,12 +174,12 @@ impl Gpu {
         }
     }
 
-    fn on(adapter: &wgpu::Adapter) -> Result<Self> {
+    /// Kernels bind what WebGPU guarantees, so that any adapter will do; only large scenes need larger buffers.
+    fn on(adapter: &wgpu::Adapter, checks: Checks) -> Result<Self> {
         let there = adapter.limits();
         let required_limits = wgpu::Limits {
             max_storage_buffer_binding_size: there.max_storage_buffer_binding_size.max(LEAST_BINDING),
             max_buffer_size: there.max_buffer_size,
-            max_storage_buffers_per_shader_stage: there.max_storage_buffers_per_shader_stage,
             ..wgpu::Limits::default()
         };
         let name = adapter.get_info().name;
@@ -161,7 +192,7 @@ impl Gpu {
         device.set_device_lost_callback(move |reason, message| {
             *why.lock().unwrap_or_else(PoisonError::into_inner) = Some(format!("{reason:?}: {message}"));
         });
-        Ok(Self { adapter: Adapter::of(adapter), device, queue, lost })
+        Ok(Self { adapter: Adapter::of(adapter), device, queue, checks, lost })
     }
 
     /// Does `work`, and makes an error of what goes wrong on the device meanwhile: a lack of memory, or a loss of the device.
@@ -206,18 +237,23 @@ impl Gpu {
         )))
     }
 
+    /// A buffer with a kernel's parameters.
+    pub(crate) fn uniform(&self, label: &str, params: &impl bytemuck::Pod) -> Result<wgpu::Buffer> {
+        self.init(label, bytemuck::bytes_of(params), wgpu::BufferUsages::UNIFORM)
+    }
+
     /// A buffer with `content`.
     pub(crate) fn upload(&self, label: &str, content: &[u8]) -> Result<wgpu::Buffer> {
         self.fits(label, content.len() as u64)?;
+        self.init(label, content, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
+    }
+
+    fn init(&self, label: &str, content: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
         self.checked(|| {
             use wgpu::util::DeviceExt;
             // A binding may not be smaller than one element.
             let contents = if content.is_empty() { &[0; 512] } else { content };
-            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage: wgpu::BufferUsages::STORAGE,
-            })
+            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
         })
     }
 }

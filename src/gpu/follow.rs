@@ -1,9 +1,10 @@
 //! Samples of paths that begin at given points: the twin of [`crate::transport::path`]'s entry points.
 
 use super::commands::Commands;
-use super::kernel::{Kernel, shader};
+use super::kernel::Kernel;
 use super::pace::Pace;
-use super::scene::{GpuScene, MATERIALS, PATHS, RAYS};
+use super::scene::GpuScene;
+use super::spec::{Access, KernelSpec, StructLayout, layout};
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::material::bsdf::{Lobes, Query};
@@ -12,8 +13,6 @@ use crate::transport::path::PathParams;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use std::sync::Arc;
-
-pub(crate) const WORKGROUP: usize = 64;
 
 /// What paths are followed for.
 #[derive(Clone, Copy, PartialEq)]
@@ -26,19 +25,12 @@ pub(crate) enum Purpose {
     Irradiance,
 }
 
-/// `PathParams` of path.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct GpuPathParams {
-    max_depth: u32,
-    rr_depth: u32,
-}
-
 /// `Params` of follow.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Params {
-    path: GpuPathParams,
+    max_depth: u32,
+    rr_depth: u32,
     lobes: u32,
     roughness_scale: f32,
     split: u32,
@@ -80,9 +72,19 @@ pub(crate) struct Place {
     pub first_set: u32,
 }
 
-fn source() -> String {
-    [RAYS, MATERIALS, PATHS, shader!("start", "follow")].concat()
-}
+/// The kernel.
+pub(crate) const FOLLOW: KernelSpec = KernelSpec {
+    file: "shared/follow.wgsl",
+    twin: "src/transport/path.rs: scattered",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[("params", Access::Uniform), ("starts", Access::Read), ("sums", Access::ReadWrite)],
+    structs: &[&PARAMS, &PATH_START],
+};
+const PARAMS: StructLayout = layout!(Params as "Params" {
+    max_depth, rr_depth, lobes, roughness_scale, split, starts, skipped, samples, branch, first_set
+});
+pub(crate) const PATH_START: StructLayout = layout!(PathStart as "PathStart" { triangle, u, v, stream, wo, first, end });
 
 /// Follows paths through a scene.
 #[derive(Clone)]
@@ -95,19 +97,19 @@ pub(crate) struct Samples {
 impl Samples {
     /// Compiles it. Where the scene has a light map, paths read diffuse light from it.
     pub fn new(scene: Arc<GpuScene>, path: &PathParams, purpose: Purpose, place: Place) -> Result<Self> {
-        let source = source();
         let constants = [
             ("IRRADIANCE", f64::from(u8::from(purpose == Purpose::Irradiance))),
             ("NEXT_EVENT", f64::from(u8::from(!matches!(purpose, Purpose::Rays(_))))),
             ("HAS_LIGHTMAP", f64::from(u8::from(scene.has_lightmap()))),
         ];
-        let kernel = Kernel::in_scene(&scene, &source, "follow", [2, 1], &constants)?;
+        let kernel = Kernel::in_scene(&scene, &FOLLOW, &constants)?;
         let query = match purpose {
             Purpose::Scattering(query) | Purpose::Rays(query) => query,
             Purpose::Irradiance => Query::default(),
         };
         let params = Params {
-            path: GpuPathParams { max_depth: path.max_depth, rr_depth: path.rr_depth },
+            max_depth: path.max_depth,
+            rr_depth: path.rr_depth,
             lobes: u32::from(query.lobes.bits()),
             roughness_scale: query.roughness_scale,
             split: u32::from(query.lobes != Lobes::ALL || purpose == Purpose::Irradiance),
@@ -130,7 +132,7 @@ impl Samples {
     /// Adds the samples of the first `count` of `starts` to `sums`, in one dispatch: of each those from `skipped` on, so many at the most.
     pub fn dispatch(&self, starts: &wgpu::Buffer, sums: &wgpu::Buffer, count: usize, [skipped, samples]: [u32; 2]) -> Result<()> {
         let params = self.part(count, [skipped, samples])?;
-        self.scene.gpu.dispatch(&self.kernel, &[&params, starts, sums], [count.div_ceil(WORKGROUP) as u32, 1])
+        self.scene.gpu.dispatch(&self.kernel, &[&params, starts, sums], [count as u32, 1])
     }
 
     /// The same among the runs of `commands`, as part of `pass`.
@@ -143,14 +145,14 @@ impl Samples {
         samples: [u32; 2],
     ) -> Result<()> {
         let params = self.part(count, samples)?;
-        commands.run(pass, &self.kernel, &[&params, starts, sums], [count.div_ceil(WORKGROUP) as u32, 1]);
+        commands.run(pass, &self.kernel, &[&params, starts, sums], [count as u32, 1]);
         Ok(())
     }
 
     /// The parameters of a dispatch.
     fn part(&self, count: usize, [skipped, samples]: [u32; 2]) -> Result<wgpu::Buffer> {
         let params = Params { starts: count as u32, skipped, samples, ..self.params };
-        self.scene.gpu.upload("parameters of paths", bytemuck::bytes_of(&params))
+        self.scene.gpu.uniform("parameters of paths", &params)
     }
 
     /// Sums over all samples of every start, in dispatches of a length that `pace` has learnt. `done` hears how many more paths are done.
@@ -207,19 +209,5 @@ impl Samples {
 
 /// Most starts a dispatch: WebGPU's most workgroups along a line, and what a kernel can bind.
 pub(crate) fn most_starts(scene: &GpuScene) -> usize {
-    (65_535 * WORKGROUP).min(scene.gpu.adapter.max_binding as usize / size_of::<PathStart>())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        let source = source();
-        check!(&source, GpuPathParams as "PathParams" { max_depth, rr_depth });
-        check!(&source, PathStart as "PathStart" { triangle, u, v, stream, wo, first, end });
-        check!(&source, Params as "Params" { path, lobes, roughness_scale, split, starts, skipped, samples, branch, first_set });
-    }
+    (65_535 * FOLLOW.workgroup[0] as usize).min(scene.gpu.adapter.max_binding as usize / size_of::<PathStart>())
 }

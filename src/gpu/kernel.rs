@@ -1,7 +1,9 @@
 //! A compute shader's entry point, and what runs it.
 
-use super::Gpu;
-use super::scene::{GpuScene, layout};
+use super::device::{Checks, Gpu};
+use super::scene::GpuScene;
+use super::source::assemble;
+use super::spec::{Access, KernelSpec};
 use crate::{Error, Result};
 use bytemuck::Pod;
 
@@ -10,15 +12,8 @@ pub(crate) fn area([width, height]: [u32; 2]) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
-/// Workgroups that cover a picture.
-pub(crate) fn groups(size: [u32; 2], workgroup: [u32; 2]) -> [u32; 2] {
-    [size[0].div_ceil(workgroup[0]), size[1].div_ceil(workgroup[1])]
-}
-
 /// Stands for infinity in shaders.
 pub(crate) const FAR: f32 = f32::MAX;
-/// Edges of a workgroup, pixels.
-pub(crate) const WORKGROUP: [u32; 2] = [16, 4];
 
 /// First row and number of rows of parts of a picture that come to `most` steps, if each of its pixels takes `steps`; whole workgroups.
 pub(crate) fn bands([width, height]: [u32; 2], most: u64, steps: u64) -> impl Iterator<Item = (u32, u32)> {
@@ -28,45 +23,74 @@ pub(crate) fn bands([width, height]: [u32; 2], most: u64, steps: u64) -> impl It
     (0..height).step_by(rows as usize).map(move |first| (first, rows))
 }
 
-/// A compiled entry point. Its bindings are buffers of group 0, numbered from 0; group 1 is the scene, for kernels that follow its light.
+/// A compiled kernel. Group 0 are its own buffers; group 1 is the scene, for kernels that follow its light.
 #[derive(Clone)]
 pub(crate) struct Kernel {
+    spec: &'static KernelSpec,
     pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
     scene: Option<wgpu::BindGroup>,
 }
 
 impl Kernel {
-    /// Compiles `source`; the name of its entry point names the kernel.
-    pub(crate) fn new(gpu: &Gpu, source: &str, entry: &'static str) -> Result<Self> {
-        Ok(Self { pipeline: pipeline(gpu, (source, checked), entry, None, &[])?, scene: None })
+    /// Compiles a kernel without a scene.
+    pub(crate) fn new(gpu: &Gpu, spec: &'static KernelSpec) -> Result<Self> {
+        Self::compile(gpu, spec, None, &[])
     }
 
-    /// A kernel in a scene, of `reads` buffers to read and then `writes` to write. `source` holds the files that `entry` needs; `constants`
-    /// are its own overrides.
-    pub(crate) fn in_scene(
-        scene: &GpuScene,
-        source: &str,
-        entry: &'static str,
-        [reads, writes]: [u32; 2],
-        constants: &[(&str, f64)],
-    ) -> Result<Self> {
-        let gpu = &scene.gpu;
-        let layout = gpu.checked(|| {
-            let own = layout(&gpu.device, entry, reads, writes);
-            gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+    /// Compiles a kernel in a scene; `constants` are its own overrides.
+    pub(crate) fn in_scene(scene: &GpuScene, spec: &'static KernelSpec, constants: &[(&str, f64)]) -> Result<Self> {
+        Self::compile(&scene.gpu, spec, Some(scene), constants)
+    }
+
+    fn compile(gpu: &Gpu, spec: &'static KernelSpec, scene: Option<&GpuScene>, constants: &[(&str, f64)]) -> Result<Self> {
+        let source = assemble(spec.file)?;
+        let mut constants = constants.to_vec();
+        if let Some(scene) = scene.filter(|_| source.contains("override HAS_MASKS")) {
+            constants.push(("HAS_MASKS", f64::from(u8::from(scene.has_masks))));
+        }
+        let (entry, device) = (spec.entry(), &gpu.device);
+        let module = if spec.scene && gpu.checks == Checks::Off { unchecked } else { checked };
+        let (pipeline, layout) = gpu.checked(|| {
+            let layout = layout(device, entry, spec.bindings.iter().map(|(_, access)| *access));
+            let groups = [Some(&layout), scene.map(|scene| &scene.layout)];
+            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(entry),
-                bind_group_layouts: &[Some(&own), Some(&scene.layout)],
+                bind_group_layouts: &groups[..1 + usize::from(spec.scene)],
                 immediate_size: 0,
-            })
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(entry),
+                layout: Some(&pipeline_layout),
+                module: &module(gpu, &source, entry),
+                entry_point: Some(entry),
+                compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
+                cache: None,
+            });
+            (pipeline, layout)
         })?;
-        let constants = [constants, &[("HAS_MASKS", f64::from(u8::from(scene.has_masks)))]].concat();
-        let compile = if cfg!(debug_assertions) { checked } else { unchecked };
-        let pipeline = pipeline(gpu, (source, compile), entry, Some(&layout), &constants)?;
-        Ok(Self { pipeline, scene: Some(scene.group.clone()) })
+        Ok(Self { spec, pipeline, layout, scene: scene.map(|scene| scene.group.clone()) })
     }
 }
 
-type Compile = fn(&Gpu, &str, &'static str) -> wgpu::ShaderModule;
+/// The layout of a group.
+pub(crate) fn layout(device: &wgpu::Device, label: &str, accesses: impl Iterator<Item = Access>) -> wgpu::BindGroupLayout {
+    let ty = |access| match access {
+        Access::Uniform => wgpu::BufferBindingType::Uniform,
+        Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
+        Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+    };
+    let entries: Vec<_> = accesses
+        .zip(0..)
+        .map(|(access, binding)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer { ty: ty(access), has_dynamic_offset: false, min_binding_size: None },
+            count: None,
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
 
 /// A module that tests every index and bounds every loop.
 fn checked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule {
@@ -79,40 +103,16 @@ fn unchecked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule
     let source = wgpu::ShaderSource::Wgsl(source.into());
     let descriptor = wgpu::ShaderModuleDescriptor { label: Some(entry), source };
     // SAFETY: every index is one of four kinds. Invocations past a list's end return first. Numbers of nodes, triangles, materials, models,
-    // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there; those of triangles
-    // at which paths start come from hits of the same scene, and those of probes' texels were tested when the probe was read. Samples that a pixel
-    // keeps are numbered below their most. Pixels, texels and table entries that are computed from coordinates are wrapped
-    // or clamped to their image or table, after the coordinates were tested for numbers. The traversal's stack is no deeper than `STACK`,
-    // which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the root down or up, or end with a path's depth, which
-    // the roulette bounds or its limit. Builds with debug assertions, so all tests, run the same kernels checked.
+    // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there: an entry's place
+    // is its list's first row, which `SceneParams` holds, plus its number times the rows of a record, and a member lies within its record
+    // by the constants of scene.wgsl, which the contract's test compares with the Rust types. Numbers of triangles at which paths start come
+    // from hits of the same scene, and those of probes' texels were tested when the probe was read. Samples that a pixel keeps are numbered
+    // below their most. Pixels, texels and table entries that are computed from coordinates are wrapped or clamped to their image or table,
+    // after the coordinates were tested for numbers; where that lies in `words` `GpuScene` has said. The traversal's stack is no deeper than
+    // `STACK`, which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the root down or up, or end with a path's
+    // depth, which the roulette bounds or its limit. tests/gpu runs the same kernels both ways.
     unsafe { gpu.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
-
-fn pipeline(
-    gpu: &Gpu,
-    (source, compile): (&str, Compile),
-    entry: &'static str,
-    layout: Option<&wgpu::PipelineLayout>,
-    constants: &[(&str, f64)],
-) -> Result<wgpu::ComputePipeline> {
-    gpu.checked(|| {
-        let module = compile(gpu, source, entry);
-        gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(entry),
-            layout,
-            module: &module,
-            entry_point: Some(entry),
-            compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
-            cache: None,
-        })
-    })
-}
-
-/// The source of shaders that lie in `shaders/`, one after the other.
-macro_rules! shader {
-    ($($name:literal),+) => { concat!($(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $name, ".wgsl"))),+) };
-}
-pub(crate) use shader;
 
 impl Gpu {
     /// A buffer for kernels to write.
@@ -138,15 +138,15 @@ impl Gpu {
         self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
     }
 
-    /// Hands a kernel's run on `groups` workgroups to the device.
+    /// Hands a kernel's run on `size` invocations to the device, with its buffers in the order of its record.
     pub(crate) fn submit(
         &self,
         kernel: &Kernel,
         buffers: &[&wgpu::Buffer],
-        groups: [u32; 2],
+        size: [u32; 2],
         timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
     ) {
-        let group = self.group(&kernel.pipeline.get_bind_group_layout(0), buffers);
+        let group = self.group(&kernel.layout, buffers);
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
         pass.set_pipeline(&kernel.pipeline);
@@ -154,15 +154,16 @@ impl Gpu {
         if let Some(scene) = &kernel.scene {
             pass.set_bind_group(1, scene, &[]);
         }
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        let [x, y] = kernel.spec.groups(size);
+        pass.dispatch_workgroups(x, y, 1);
         drop(pass);
         self.queue.submit([encoder.finish()]);
     }
 
-    /// Runs a kernel on `groups` workgroups and waits for it.
-    pub(crate) fn dispatch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 2]) -> Result<()> {
+    /// Runs a kernel on `size` invocations and waits for it.
+    pub(crate) fn dispatch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer], size: [u32; 2]) -> Result<()> {
         self.checked(|| {
-            self.submit(kernel, buffers, groups, None);
+            self.submit(kernel, buffers, size, None);
             self.wait();
         })
     }

@@ -1,7 +1,8 @@
 //! Closest hits of many rays: the twin of [`crate::transport::World::closest`].
 
 use super::kernel::Kernel;
-use super::scene::{GpuScene, RAYS};
+use super::scene::GpuScene;
+use super::spec::{Access, KernelSpec, StructLayout, layout};
 use crate::Result;
 use crate::base::ray::{Hit, Ray};
 use bytemuck::{Pod, Zeroable};
@@ -10,8 +11,7 @@ use std::sync::Arc;
 /// Rays a dispatch: well below a second even on a software adapter.
 const BATCH: usize = 1 << 18;
 
-const NO_TRIANGLE: u32 = u32::MAX;
-const WORKGROUP: usize = 64;
+pub(crate) const NO_TRIANGLE: u32 = u32::MAX;
 
 /// `Ray` of surface.wgsl.
 #[repr(C)]
@@ -32,6 +32,18 @@ struct GpuHit {
     u: f32,
     v: f32,
 }
+
+/// The kernel.
+pub(crate) const CLOSEST: KernelSpec = KernelSpec {
+    file: "shared/closest.wgsl",
+    twin: "src/transport/world.rs: closest",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[("rays", Access::Read), ("hits", Access::ReadWrite)],
+    structs: &[&RAY, &HIT],
+};
+const RAY: StructLayout = layout!(GpuRay as "Ray" { origin, t_min, direction, t_max });
+const HIT: StructLayout = layout!(GpuHit as "Hit" { t, triangle, u, v });
 
 impl GpuRay {
     fn new(ray: &Ray) -> Self {
@@ -56,8 +68,7 @@ pub struct RayTracer {
 impl RayTracer {
     /// Compiles the kernel.
     pub fn new(scene: Arc<GpuScene>) -> Result<Self> {
-        let source = [RAYS, include_str!("../../shaders/closest.wgsl")].concat();
-        let kernel = Kernel::in_scene(&scene, &source, "closest", [1, 1], &[])?;
+        let kernel = Kernel::in_scene(&scene, &CLOSEST, &[])?;
         Ok(Self { scene, kernel })
     }
 
@@ -77,7 +88,7 @@ impl RayTracer {
         let sent: Vec<GpuRay> = rays.iter().map(GpuRay::new).collect();
         let sent = gpu.upload("rays", bytemuck::cast_slice(&sent))?;
         let hits = gpu.output("hits", (rays.len() * size_of::<GpuHit>()) as u64)?;
-        gpu.dispatch(&self.kernel, &[&sent, &hits], [rays.len().div_ceil(WORKGROUP) as u32, 1])?;
+        gpu.dispatch(&self.kernel, &[&sent, &hits], [rays.len() as u32, 1])?;
         Ok(gpu.read::<GpuHit>(&hits)?.into_iter().map(GpuHit::hit).collect())
     }
 }

@@ -10,10 +10,10 @@ const EPSILON: f32 = f32::EPSILON / 2.0;
 /// How far off its surface a ray starts, in rounding errors of the largest coordinate of the point and of the triangle's
 /// corners. Interpolation and intersection lose about 10 of the latter together. *Ours*: Mitsuba moves by 1500 of
 /// (1 + largest coordinate), which depends on the unit of length and lets light under the feet of furniture.
-const OFFSET_ULPS: (f32, f32) = (256.0, 32.0);
+pub(crate) const OFFSET_ULPS: (f32, f32) = (256.0, 32.0);
 
 /// How much of its length a shadow ray leaves out before its target, where grazing light magnifies rounding errors.
-const SHADOW_GAP: f32 = 3e-4;
+pub(crate) const SHADOW_GAP: f32 = 3e-4;
 
 /// A point on a surface with all that a BSDF asks for.
 #[derive(Debug, Clone, Copy)]

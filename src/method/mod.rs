@@ -2,6 +2,8 @@
 //!
 //! A method is a way of making frames. What differs between methods stands in its row; what a frame of any of them is, in [`Renderer`].
 
+#[cfg(test)]
+mod contract;
 pub mod glossy_probes;
 pub mod image_space_gather;
 pub mod lightmap_rt;

@@ -17,7 +17,7 @@ use half::f16;
 use std::path::{Path, PathBuf};
 
 /// Smallest derivative that [`ParameterMap::search_scale`] divides by, lat-long texels per texel.
-const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
+pub(crate) const DERIVATIVE_MIN: f32 = 1.0 / 64.0;
 
 /// The parameterisation of one probe.
 #[derive(Debug, Clone, PartialEq)]

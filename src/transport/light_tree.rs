@@ -10,11 +10,11 @@ use std::f32::consts::PI;
 use std::ops::Range;
 
 /// What the cosine at the receiver counts at least.
-const BACK: f32 = 0.05;
+pub(crate) const BACK: f32 = 0.05;
 
 /// Share of the choice among a node's children that goes to all of them alike: the importance does not know what is
 /// hidden, and a bright lamp behind a wall must not take all samples from the one in the room.
-const EVEN: f32 = 0.25;
+pub(crate) const EVEN: f32 = 0.25;
 
 /// Parts of an axis between which a node may be split.
 const BINS: usize = 12;
@@ -44,10 +44,10 @@ pub struct LightBounds {
 }
 
 /// Children of a node: an emitter that many others surround costs two or three steps, and eight bounds side by side vectorise.
-const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 /// Marks a child that is an emitter.
-const LEAF: u32 = 1 << 31;
+pub(crate) const LEAF: u32 = 1 << 31;
 
 /// The hierarchy; emitters are numbers from 0 in the order in which their bounds came.
 #[derive(Debug, Default)]

@@ -19,12 +19,12 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Largest probability with which the roulette lets a path live.
-const ROULETTE_CAP: f32 = 0.98;
+pub(crate) const ROULETTE_CAP: f32 = 0.98;
 
 /// How much likelier than its throughput a path lives. *Ours*: with 1, Mitsuba's, every survivor weighs as much as a path that
 /// has lost nothing, and where light is found late (caustics, bright corners) few heavy paths make most of the noise. Starting
 /// earlier pays for it.
-const ROULETTE_MERCY: f32 = 4.0;
+pub(crate) const ROULETTE_MERCY: f32 = 4.0;
 
 /// Depth and termination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use crate::base::math::{hash_words, hash64, unit};
 use glam::Vec2;
 
 /// Sets of four dimensions that are Sobol points; later ones are hashes. Four path vertices.
-const SOBOL_SETS: u32 = 8;
+pub(crate) const SOBOL_SETS: u32 = 8;
 
 /// The sample dimensions of one path, drawn in order.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! Baked probes and light maps: the same paths as on the CPU.
 
-use crate::{gpu, room};
+use crate::{Device, room};
 use glam::Vec3;
 use reprobe::base::math::Rgb;
 use reprobe::base::progress::Silent;
@@ -37,9 +37,8 @@ pub fn lightmap(world: &World, params: &LightParams, gpu: Option<(&GpuScene, &Pa
     run(&plan.second_pass(first.as_ref()).on(gpu.map(|paths| paths as &dyn Follow)))
 }
 
-#[test]
-fn light_maps_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn light_maps_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let world = room();
     let scene = GpuScene::new(gpu, &world).unwrap();
     let atlas = AtlasParams { texel: Some(0.4), ..AtlasParams::default() };
@@ -51,9 +50,8 @@ fn light_maps_are_the_cpus() {
     assert_eq!(a.back.is_some(), b.back.is_some());
 }
 
-#[test]
-fn probes_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn probes_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let world = room();
     let params =
         LightParams { spp: 4, atlas: AtlasParams { texel: Some(0.3), ..AtlasParams::default() }, ..LightParams::default() };

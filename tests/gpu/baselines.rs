@@ -2,7 +2,7 @@
 
 use crate::bakes::lightmap;
 use crate::paths::difference;
-use crate::{gpu, room};
+use crate::{Device, room};
 use reprobe::base::math::Rgb;
 use reprobe::gpu::view::frame::BaselineFrame;
 use reprobe::lightmap::{AtlasParams, LightMap, LightMapParams};
@@ -58,9 +58,8 @@ impl Setting {
     }
 }
 
-#[test]
-fn rays_along_the_lobes_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn rays_along_the_lobes_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let setting = Setting::new();
     let Setting { world, lightmap, camera, view } = &setting;
     for (next_event, bounces) in [(false, 3), (true, 2)] {
@@ -77,9 +76,8 @@ fn rays_along_the_lobes_are_the_cpus() {
     }
 }
 
-#[test]
-fn gathered_mirror_pictures_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn gathered_mirror_pictures_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let setting = Setting::new();
     let Setting { world, lightmap, camera, view } = &setting;
     let mut on_gpu = ImageSpaceGather::new(gpu, world, lightmap, SUPERSAMPLE).unwrap();

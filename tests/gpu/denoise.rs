@@ -1,7 +1,7 @@
 //! The denoiser of path-traced frames.
 
 use crate::paths::zoo;
-use crate::{gpu, room};
+use crate::{Device, room};
 use reprobe::base::math::Rgb;
 use reprobe::base::progress::Silent;
 use reprobe::gpu::{Gpu, GpuScene};
@@ -54,9 +54,8 @@ fn check(gpu: &Arc<Gpu>, world: &World, camera: &Camera, params: &DenoiseParams,
     }
 }
 
-#[test]
-fn denoised_frames_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn denoised_frames_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let world = room();
     let camera = Camera { size: [75, 42], ..world.scene.sensor.clone().unwrap() };
     let params = DenoiseParams::default();
@@ -67,9 +66,8 @@ fn denoised_frames_are_the_cpus() {
     }
 }
 
-#[test]
-fn guides_of_every_model_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn guides_of_every_model_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let folder = tempfile::tempdir().unwrap();
     let world = zoo(folder.path());
     let camera = world.scene.sensor.clone().unwrap();

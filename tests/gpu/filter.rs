@@ -1,14 +1,13 @@
 //! The glossy filter.
 
-use crate::gpu;
+use crate::Device;
 use glam::Vec3;
 use reprobe::method::glossy_probes::filter::{Convolution, FilterInput, FilterParams, Kernel, NOT_GLOSSY, filter};
 use reprobe::method::glossy_probes::gpu::filter::Filter;
 use reprobe::transport::Sampler;
 
-#[test]
-fn the_filter_is_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn the_filter_is_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let (width, height) = (150, 91);
     let n = width * height;
     let place = |i: usize| ((i % width) as f32 / width as f32, (i / width) as f32 / height as f32);

@@ -1,6 +1,7 @@
 //! The passes of `render-path --method glossy-probes`, frame by frame.
 
-use crate::device;
+use crate::Device;
+use reprobe::gpu::Checks;
 use reprobe::io::ExrImage;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -49,20 +50,24 @@ impl Baked {
         Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args.split_whitespace()).current_dir(self.0.path()).output().unwrap()
     }
 
-    /// Renders into the folder `name`.
-    pub fn render(&self, name: &str, device: &str, options: &str) -> Output {
+    /// Renders into the folder `name`, on the CPU without a device.
+    pub fn render(&self, name: &str, device: Option<&Device>, options: &str) -> Output {
+        let choice = device.map_or("cpu", |d| d.name.as_str());
         let inputs = "--probes out/probes --lightmap out/lightmap.exr --curvature out/curvature.exr --path path.json";
-        let mut args = vec!["render-path", "scene.xml", "-o", name, "--device", device, "--json"];
+        let mut args = vec!["render-path", "scene.xml", "-o", name, "--device", choice, "--json"];
         args.extend(inputs.split_whitespace().chain(options.split_whitespace()));
-        Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args).current_dir(self.0.path()).output().unwrap()
+        let mut command = Command::new(env!("CARGO_BIN_EXE_reprobe"));
+        if let Some(device) = device {
+            command.env(Checks::VARIABLE, device.checks_word());
+        }
+        command.args(args).current_dir(self.0.path()).output().unwrap()
     }
 
     /// The frames of the CPU and of the adapter, and the latter's timings.
-    pub fn both(&self, name: &str, options: &str) -> (Vec<[ExrImage; 2]>, Value) {
-        let device = device().unwrap();
-        let folders = ["cpu", "gpu"].map(|d| format!("{name}-{d}"));
+    pub fn both(&self, device: &Device, name: &str, options: &str) -> (Vec<[ExrImage; 2]>, Value) {
+        let folders = ["cpu", "gpu"].map(|d| format!("{name}-{d}-checks-{}", device.checks_word()));
         let [_, gpu] = [0, 1].map(|i| {
-            let output = self.render(&folders[i], ["cpu", &device][i], options);
+            let output = self.render(&folders[i], [None, Some(device)][i], options);
             assert!(output.status.success(), "{options}: {}", text(&output.stderr));
             serde_json::from_slice(&output.stdout).unwrap()
         });
@@ -110,12 +115,8 @@ fn check(images: &[ExrImage; 2]) {
     assert!(glossy.iter().filter(|c| c.max_element() > 0.0).count() * 3 > pixels, "next to nothing is glossy");
 }
 
-#[test]
-fn frames_are_the_cpus() {
-    if device().is_none() {
-        return;
-    }
-    let baked = Baked::new();
+pub fn frames_are_the_cpus(device: &Device) {
+    let baked = device.baked();
     for (name, options) in [
         ("default", ""),
         ("paper", "--paper"),
@@ -124,7 +125,7 @@ fn frames_are_the_cpus() {
         // Memory for hardly more than one probe of the eight.
         ("small", "--gpu-memory 7M --set gather.albedo_ratio=false --set gather.anchors=3"),
     ] {
-        let (frames, timings) = baked.both(name, &format!("{options} --aov all"));
+        let (frames, timings) = baked.both(device, name, &format!("{options} --aov all"));
         for (n, images) in frames.iter().enumerate() {
             eprintln!("{name}, frame {n}");
             check(images);
@@ -141,7 +142,7 @@ fn frames_are_the_cpus() {
     for (name, options) in
         [("rays", "--method lightmap-rt --samples 8 --supersample 2"), ("mirrors", "--method image-space-gather --supersample 2")]
     {
-        let (frames, timings) = baked.both(name, options);
+        let (frames, timings) = baked.both(device, name, options);
         for images in &frames {
             for layer in ["emission", "diffuse", "glossy", ""] {
                 // A ray that rounding sends another way is another sample.
@@ -156,7 +157,7 @@ fn frames_are_the_cpus() {
         ("--gpu-memory 1M", "--gpu-memory"),
         ("--gpu-memory 1T", "like 512M or 2G"),
     ] {
-        let output = baked.render("refused", &device().unwrap(), options);
+        let output = baked.render("refused", Some(device), options);
         assert!(output.status.code() == Some(2) && text(&output.stderr).contains(expected), "{}", text(&output.stderr));
         assert!(!baked.at("refused").join("0000.exr").exists());
     }

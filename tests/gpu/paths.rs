@@ -1,7 +1,7 @@
 //! Path-traced frames. Both twins draw the same random numbers, so that pixels agree but for rounding, and for the few paths that rounding sends
 //! another way.
 
-use crate::{gpu, room};
+use crate::{Device, room};
 use glam::Vec3;
 use reprobe::base::math::Rgb;
 use reprobe::base::progress::Silent;
@@ -34,9 +34,8 @@ fn check(what: &str, gpu: &LayerImages, cpu: &LayerImages, most_apart: f32) {
     }
 }
 
-#[test]
-fn layers_and_full_images_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn layers_and_full_images_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let world = room();
     let camera = Camera { size: [48, 27], ..world.scene.sensor.clone().unwrap() };
     let params = PathTraceParams { spp: 8, ..PathTraceParams::default() };
@@ -116,9 +115,8 @@ pub fn zoo(folder: &std::path::Path) -> World {
     World::new(reprobe::exchange::load(&file, &Default::default()).unwrap())
 }
 
-#[test]
-fn every_model_and_emitter_is_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn every_model_and_emitter_is_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let folder = tempfile::tempdir().unwrap();
     let world = zoo(folder.path());
     let camera = world.scene.sensor.clone().unwrap();
@@ -128,9 +126,8 @@ fn every_model_and_emitter_is_the_cpus() {
     check("zoo", &gpu, &path_trace(&world, &camera, &params, 1, 0, &Silent), 0.05);
 }
 
-#[test]
-fn a_model_that_the_gpu_lacks_is_named() {
-    let Some(gpu) = gpu() else { return };
+pub fn a_model_that_the_gpu_lacks_is_named(device: &Device) {
+    let gpu = device.gpu();
     let folder = tempfile::tempdir().unwrap();
     let bump = "<texture type='checkerboard'/>";
     let text = format!(

@@ -1,6 +1,6 @@
 //! Closest hits.
 
-use crate::{gpu, room};
+use crate::{Device, room};
 use glam::Vec3;
 use reprobe::base::math::direction_from_lat_long;
 use reprobe::base::ray::{Hit, Ray};
@@ -51,9 +51,8 @@ fn check(scene: &Scene, rays: &[Ray], gpu: &[Option<Hit>], cpu: &[Option<Hit>]) 
     assert!(other * 20_000 <= rays.len(), "{other} of {} rays meet something else", rays.len());
 }
 
-#[test]
-fn closest_hits_are_the_cpus() {
-    let Some(gpu) = gpu() else { return };
+pub fn closest_hits_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
     let world = room();
     let tracer = tracer(gpu, &world);
     let rays = rays(&world, 40_000);
@@ -62,9 +61,8 @@ fn closest_hits_are_the_cpus() {
     check(&world.scene, &rays, &tracer.closest(&rays).unwrap(), &cpu);
 }
 
-#[test]
-fn rays_go_on_through_alpha_masks_as_on_the_cpu() {
-    let Some(gpu) = gpu() else { return };
+pub fn rays_go_on_through_alpha_masks_as_on_the_cpu(device: &Device) {
+    let gpu = device.gpu();
     let mut scene = room().scene;
     for material in scene.materials.iter_mut().step_by(2) {
         material.opacity = Some(reprobe::material::Opacity::constant(0.5));
@@ -78,9 +76,8 @@ fn rays_go_on_through_alpha_masks_as_on_the_cpu() {
     check(&world.scene, &rays, &tracer(gpu, &world).closest(&rays).unwrap(), &cpu);
 }
 
-#[test]
-fn a_probe_sees_the_same_through_either() {
-    let Some(gpu) = gpu() else { return };
+pub fn a_probe_sees_the_same_through_either(device: &Device) {
+    let gpu = device.gpu();
     let world = room();
     let (position, size) = (Vec3::new(0.3, 1.4, 0.2), [64, 32]);
     let rays = SeenBuffers::rays(position, size);
@@ -93,9 +90,8 @@ fn a_probe_sees_the_same_through_either() {
     assert_eq!(gpu.texels.iter().filter(|t| t.is_none()).count(), cpu.texels.iter().filter(|t| t.is_none()).count());
 }
 
-#[test]
-fn a_scene_without_surfaces_has_no_hits() {
-    let Some(gpu) = gpu() else { return };
+pub fn a_scene_without_surfaces_has_no_hits(device: &Device) {
+    let gpu = device.gpu();
     let world = World::new(Scene::default());
     let hits = tracer(gpu, &world).closest(&[Ray::new(Vec3::ZERO, Vec3::X)]).unwrap();
     assert_eq!(hits, [None]);

@@ -1,13 +1,11 @@
 //! Frames of `render-path --method ulr`.
 
-use crate::device;
-use crate::frames::{Baked, rmse, text};
+use crate::Device;
+use crate::frames::{rmse, text};
 use std::path::Path;
 
-#[test]
-fn lumigraphs_are_the_cpus() {
-    let Some(device) = device() else { return };
-    let baked = Baked::new();
+pub fn lumigraphs_are_the_cpus(device: &Device) {
+    let baked = device.baked();
     for (name, options) in [
         ("ulr", ""),
         // Fewer probes than a pixel could blend, seen from more sub-pixels.
@@ -15,7 +13,7 @@ fn lumigraphs_are_the_cpus() {
         // Texels that count as hidden where a slant spreads them, hardly worse than the others; memory for a few probes of the eighteen.
         ("ulr-hidden", "--set blend=2 --set plane_tolerance=0.0001 --set hidden=0.05 --gpu-memory 6M"),
     ] {
-        let (frames, timings) = baked.both(name, &format!("--method ulr {options}"));
+        let (frames, timings) = baked.both(device, name, &format!("--method ulr {options}"));
         for images in &frames {
             for layer in ["emission", "diffuse", "glossy", ""] {
                 assert!(rmse(images, layer) < 1e-3, "{name}, {layer}: {}", rmse(images, layer));
@@ -25,6 +23,6 @@ fn lumigraphs_are_the_cpus() {
         }
         assert!(timings["mean_ms"]["gather"].as_f64().unwrap() > 0.0 && timings["device"].is_string());
     }
-    let output = baked.render("refused", &device, "--method ulr --gpu-memory 1M");
+    let output = baked.render("ulr-refused", Some(device), "--method ulr --gpu-memory 1M");
     assert!(output.status.code() == Some(2) && text(&output.stderr).contains("--gpu-memory"), "{}", text(&output.stderr));
 }

@@ -1,14 +1,16 @@
 //! Emitters, what chooses from them, and environments.
 
 use super::textures::{GpuImage, Textures};
-use super::{NONE, Tables};
+use super::{NONE, Words};
+use crate::gpu::spec::{StructLayout, layout};
 use crate::scene::Emitter;
 use crate::transport::World;
+use crate::transport::light_tree::WIDTH;
 use crate::transport::lights::{Environment, Near};
 use bytemuck::{Pod, Zeroable};
 use glam::Mat3;
 
-/// `Emitter` of scene.wgsl.
+/// An emitter, as the constants `EMITTER_...` of scene.wgsl have it.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 pub(crate) struct GpuEmitter {
@@ -24,11 +26,11 @@ pub(crate) struct GpuEmitter {
     padding: u32,
 }
 
-const AREA: u32 = 0;
-const POINT: u32 = 1;
-const SPOT: u32 = 2;
-const DIRECTIONAL: u32 = 3;
-const AT_INFINITY: u32 = 4;
+pub(crate) const AREA: u32 = 0;
+pub(crate) const POINT: u32 = 1;
+pub(crate) const SPOT: u32 = 2;
+pub(crate) const DIRECTIONAL: u32 = 3;
+pub(crate) const AT_INFINITY: u32 = 4;
 
 /// `Near` of scene.wgsl.
 #[repr(C)]
@@ -37,10 +39,25 @@ pub(crate) struct GpuNear {
     triangle: u32,
     emitter: u32,
     area: f32,
-    padding: u32,
+    place: u32,
 }
 
-/// `Environment` of scene.wgsl.
+pub(crate) const NEAR: StructLayout = layout!(GpuNear as "Near" { triangle, emitter, area, place });
+#[cfg(test)]
+pub(crate) const EMITTER: StructLayout = layout!(GpuEmitter as "EMITTER" {
+    position, kind, direction, texture, color, cutoff, beam, first, start
+});
+/// The light tree's nodes are uploaded as they are.
+#[cfg(test)]
+pub(crate) const LIGHT_NODE: StructLayout = layout!(crate::transport::light_tree::Node as "LIGHT_NODE" {
+    centre, radius_sq, axis, cos_spread, sin_spread, cos_reach, power, children, parent
+});
+#[cfg(test)]
+pub(crate) const ENVIRONMENT: StructLayout = layout!(GpuEnvironment as "ENVIRONMENT" {
+    world_from_local, local_from_world, color, scale, image, row_sums, column_sums, sines, mean
+});
+
+/// An environment, as the constants `ENVIRONMENT_...` of scene.wgsl have it.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 pub(crate) struct GpuEnvironment {
@@ -49,17 +66,17 @@ pub(crate) struct GpuEnvironment {
     color: [f32; 3],
     scale: f32,
     image: GpuImage,
-    rows: u32,
-    columns: u32,
+    row_sums: u32,
+    column_sums: u32,
     sines: u32,
     mean: f32,
 }
 
-pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tables) -> Vec<GpuEmitter> {
+pub(crate) fn emitters(world: &World, textures: &mut Textures, words: &mut Words) -> Vec<GpuEmitter> {
     let of = |(i, emitter): (usize, &Emitter)| match emitter {
         Emitter::Area { object, radiance } => GpuEmitter {
             kind: AREA,
-            texture: textures.add(radiance, tables),
+            texture: textures.add(radiance, words),
             first: world.lights.first[i].unwrap_or(NONE),
             start: world.scene.geometry.objects[*object as usize].triangles.start,
             ..GpuEmitter::default()
@@ -90,16 +107,19 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, tables: &mut Tabl
 }
 
 pub(crate) fn near(world: &World) -> Vec<GpuNear> {
-    let of = |near: &Near| match near {
-        Near::Triangle(t) => GpuNear { triangle: t.index, emitter: t.emitter, area: t.area, padding: 0 },
-        // Refused before it comes here.
-        Near::Round(_) => GpuNear { triangle: NONE, emitter: NONE, ..GpuNear::default() },
-        Near::Delta(emitter) => GpuNear { triangle: NONE, emitter: *emitter, ..GpuNear::default() },
+    let of = |(near, [node, slot]): (&Near, &[u32; 2])| {
+        let place = node * WIDTH as u32 + slot;
+        match near {
+            Near::Triangle(t) => GpuNear { triangle: t.index, emitter: t.emitter, area: t.area, place },
+            // Refused before it comes here.
+            Near::Round(_) => GpuNear { triangle: NONE, emitter: NONE, area: 0.0, place },
+            Near::Delta(emitter) => GpuNear { triangle: NONE, emitter: *emitter, area: 0.0, place },
+        }
     };
-    world.lights.near.iter().map(of).collect()
+    world.lights.near.iter().zip(&world.lights.tree.place).map(of).collect()
 }
 
-pub(crate) fn environments(world: &World, textures: &mut Textures, tables: &mut Tables) -> Vec<GpuEnvironment> {
+pub(crate) fn environments(world: &World, textures: &mut Textures, words: &mut Words) -> Vec<GpuEnvironment> {
     let columns = |m: &Mat3| m.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]);
     let of = |environment: &Environment| match environment {
         Environment::Constant(color) => GpuEnvironment { color: color.to_array(), ..GpuEnvironment::default() },
@@ -107,31 +127,13 @@ pub(crate) fn environments(world: &World, textures: &mut Textures, tables: &mut 
             world_from_local: columns(&map.world_from_local),
             local_from_world: columns(&map.local_from_world),
             scale: map.scale,
-            image: textures.image(&map.image, tables),
-            rows: tables.floats(map.rows.sums.iter().copied()),
-            columns: tables.floats(map.columns.iter().flat_map(|row| row.sums.iter().copied())),
-            sines: tables.floats(map.sines.iter().copied()),
+            image: textures.image(&map.image, words),
+            row_sums: words.floats(map.rows.sums.iter().copied()),
+            column_sums: words.floats(map.columns.iter().flat_map(|row| row.sums.iter().copied())),
+            sines: words.floats(map.sines.iter().copied()),
             mean: map.mean,
             ..GpuEnvironment::default()
         },
     };
     world.lights.environments.iter().map(of).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-    use crate::gpu::scene::RAYS;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(RAYS, GpuEmitter as "Emitter" {
-            position, kind, direction, texture, color, cutoff, beam, first, start
-        });
-        check!(RAYS, GpuNear as "Near" { triangle, emitter, area });
-        check!(RAYS, GpuEnvironment as "Environment" {
-            world_from_local, local_from_world, color, scale, image, rows, columns, sines, mean
-        });
-    }
 }

@@ -1,13 +1,14 @@
 //! Materials and the trees of scattering models.
 
 use super::textures::Textures;
-use super::{NONE, Tables};
-use crate::material::bsdf::roughplastic::COSINES;
+use super::{NONE, Words};
+#[cfg(test)]
+use crate::gpu::spec::{StructLayout, layout};
 use crate::material::bsdf::{Bsdf, Distribution, Lobes, PlasticParams};
 use crate::material::{Material, Opacity, Texture};
 use bytemuck::{Pod, Zeroable};
 
-/// `Material` of scene.wgsl.
+/// A material, as the constants `MATERIAL_...` of scene.wgsl have it.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(crate) struct GpuMaterial {
@@ -17,10 +18,10 @@ pub(crate) struct GpuMaterial {
     flags: u32,
 }
 
-const TRANSMISSIVE: u32 = 1;
-const TWO_SIDED_FLAG: u32 = 2;
+pub(crate) const TRANSMISSIVE: u32 = 1;
+pub(crate) const TWO_SIDED_FLAG: u32 = 2;
 
-/// `Model` of scene.wgsl.
+/// A scattering model, as the constants `MODEL_...` of scene.wgsl have it.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 pub(crate) struct GpuModel {
@@ -42,10 +43,17 @@ pub(crate) struct GpuModel {
     padding: [u32; 2],
 }
 
-/// Kinds of models, numbered as in bsdf.wgsl.
+#[cfg(test)]
+pub(crate) const MATERIAL: StructLayout = layout!(GpuMaterial as "MATERIAL" { model, opacity, lobes, flags });
+#[cfg(test)]
+pub(crate) const MODEL: StructLayout = layout!(GpuModel as "MODEL" {
+    kind, distribution, lobes, leaves, first, second, table, option, eta, a, k, b, textures, alpha, slots
+});
+
+/// Kinds of models, numbered as in models.wgsl.
 #[derive(Clone, Copy)]
 #[repr(u32)]
-enum Kind {
+pub(crate) enum Kind {
     Diffuse,
     Plastic,
     RoughPlastic,
@@ -65,7 +73,7 @@ enum Kind {
 pub(crate) struct Models<'a> {
     pub list: Vec<GpuModel>,
     pub textures: &'a mut Textures,
-    pub tables: &'a mut Tables,
+    pub words: &'a mut Words,
 }
 
 impl Models<'_> {
@@ -89,7 +97,7 @@ impl Models<'_> {
     }
 
     fn texture(&mut self, texture: &Texture) -> u32 {
-        self.textures.add(texture, self.tables)
+        self.textures.add(texture, self.words)
     }
 
     fn slots<const N: usize>(&mut self, textures: [&Texture; N]) -> [u32; 12] {
@@ -110,7 +118,7 @@ impl Models<'_> {
                 eta: eta(m.eta),
                 a: m.internal_reflectance,
                 b: m.mean_transmittance,
-                table: self.tables.floats(m.transmittance.iter().copied()),
+                table: self.words.floats(m.transmittance.iter().copied()),
                 alpha: m.alpha,
                 ..self.plastic(Kind::RoughPlastic, &m.params)
             },
@@ -220,7 +228,7 @@ fn of(kind: Kind) -> GpuModel {
     GpuModel { kind: kind as u32, leaves: 1, first: NONE, second: NONE, table: NONE, textures: [NONE; 12], ..GpuModel::default() }
 }
 
-fn family(distribution: Distribution) -> u32 {
+pub(crate) fn family(distribution: Distribution) -> u32 {
     match distribution {
         Distribution::Beckmann => 0,
         Distribution::Ggx => 1,
@@ -235,23 +243,5 @@ pub(crate) fn tilts(bsdf: &Bsdf) -> usize {
         Bsdf::TwoSided(m) => tilts(&m.front).max(tilts(&m.back)),
         Bsdf::Blend(m) => tilts(&m.a).max(tilts(&m.b)),
         _ => 0,
-    }
-}
-
-// PLASTIC_COSINES of bsdf.wgsl.
-const _: () = assert!(COSINES == 64);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-    use crate::gpu::scene::RAYS;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(RAYS, GpuMaterial as "Material" { model, opacity, lobes, flags });
-        check!(RAYS, GpuModel as "Model" {
-            kind, distribution, lobes, leaves, first, second, table, option, eta, a, k, b, textures, alpha, slots
-        });
     }
 }

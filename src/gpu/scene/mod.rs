@@ -1,10 +1,12 @@
-//! A scene on the device: what kernels that follow light paths bind as their group 1 (shaders/scene.wgsl).
+//! A scene on the device: what kernels that follow light paths bind as their group 1 (shaders/shared/scene.wgsl).
 
-mod lights;
-mod materials;
-mod textures;
+pub(crate) mod lights;
+pub(crate) mod materials;
+pub(crate) mod textures;
 
 use super::Gpu;
+use super::kernel::layout;
+use super::spec::{Access, StructLayout, layout};
 use crate::lightmap::LightMap;
 use crate::material::bsdf::{Distribution, albedo};
 use crate::scene::Emitter;
@@ -18,69 +20,89 @@ use obvhs::cwbvh::CwBvh;
 use std::sync::Arc;
 use textures::Textures;
 
-/// What traces rays through a scene.
-pub(crate) const RAYS: &str = concat!(
-    include_str!("../../../shaders/math.wgsl"),
-    include_str!("../../../shaders/random.wgsl"),
-    include_str!("../../../shaders/scene.wgsl"),
-    include_str!("../../../shaders/texture.wgsl"),
-    include_str!("../../../shaders/surface.wgsl"),
-    include_str!("../../../shaders/traverse.wgsl"),
-);
-
-/// What scatters light, after [`RAYS`].
-pub(crate) const MATERIALS: &str = concat!(
-    include_str!("../../../shaders/fresnel.wgsl"),
-    include_str!("../../../shaders/microfacet.wgsl"),
-    include_str!("../../../shaders/models.wgsl"),
-    include_str!("../../../shaders/principled.wgsl"),
-    include_str!("../../../shaders/bsdf.wgsl"),
-    include_str!("../../../shaders/albedo.wgsl"),
-);
-
-/// What follows paths, after [`MATERIALS`].
-pub(crate) const PATHS: &str = concat!(
-    include_str!("../../../shaders/light_tree.wgsl"),
-    include_str!("../../../shaders/envmap.wgsl"),
-    include_str!("../../../shaders/lights.wgsl"),
-    include_str!("../../../shaders/lightmap.wgsl"),
-    include_str!("../../../shaders/path.wgsl"),
-);
-
 /// No texture, table or entry.
-const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Depth of the shader's stack. A node leaves at most one entry.
-const STACK: usize = 32;
+pub(crate) const STACK: usize = 32;
 
 /// `SceneParams` of scene.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct SceneParams {
+    materials: u32,
+    models: u32,
+    textures: u32,
+    emitters: u32,
+    near: u32,
+    light_nodes: u32,
     environments: u32,
-    suns: u32,
-    sun_list: u32,
+    environment_count: u32,
     has_near: u32,
+    suns: u32,
+    corners: u32,
+    sun_list: u32,
     sobol: u32,
     albedo: u32,
     light_width: u32,
     light_height: u32,
+    light_front: u32,
     light_back: u32,
+    light_corners: u32,
 }
 
-/// Words that several bindings share, by their offsets.
-#[derive(Default)]
-struct Tables(Vec<u32>);
+/// The bindings of group 1.
+pub(crate) const BINDINGS: [(&str, Access); 5] = [
+    ("scene_params", Access::Uniform),
+    ("tree", Access::Read),
+    ("facets", Access::Read),
+    ("words", Access::Read),
+    ("records", Access::Read),
+];
+const PARAMS: StructLayout = layout!(SceneParams as "SceneParams" {
+    materials, models, textures, emitters, near, light_nodes, environments, environment_count, has_near, suns, corners, sun_list, sobol,
+    albedo, light_width, light_height, light_front, light_back, light_corners
+});
+/// The structs of scene.wgsl.
+#[cfg_attr(not(test), allow(dead_code, reason = "read by the contract's test"))]
+pub(crate) const STRUCTS: [&StructLayout; 3] = [&PARAMS, &textures::IMAGE, &lights::NEAR];
+/// The records, as scene.wgsl's constants of these names have them.
+#[cfg(test)]
+pub(crate) const RECORDS: [&StructLayout; 6] =
+    [&materials::MATERIAL, &materials::MODEL, &textures::TEXTURE, &lights::EMITTER, &lights::LIGHT_NODE, &lights::ENVIRONMENT];
 
-impl Tables {
-    fn words(&mut self, words: impl IntoIterator<Item = u32>) -> u32 {
+/// Words that lie one after the other, found by their offsets.
+#[derive(Default)]
+pub(crate) struct Words(Vec<u32>);
+
+impl Words {
+    fn extend(&mut self, words: impl IntoIterator<Item = u32>) -> u32 {
         let at = self.0.len() as u32;
         self.0.extend(words);
         at
     }
 
     fn floats(&mut self, values: impl IntoIterator<Item = f32>) -> u32 {
-        self.words(values.into_iter().map(f32::to_bits))
+        self.extend(values.into_iter().map(f32::to_bits))
+    }
+}
+
+/// Lists of records, in rows of four words.
+#[derive(Default)]
+struct Records(Vec<[u32; 4]>);
+
+impl Records {
+    /// Adds a list; its first row.
+    fn list<T: Pod>(&mut self, list: &[T]) -> u32 {
+        let first = self.0.len() as u32;
+        for record in list {
+            self.0.extend(bytemuck::bytes_of(record).chunks(16).map(|bytes| {
+                let mut row = [0; 16];
+                row[..bytes.len()].copy_from_slice(bytes);
+                bytemuck::cast::<[u8; 16], [u32; 4]>(row)
+            }));
+        }
+        first
     }
 }
 
@@ -88,29 +110,21 @@ impl Tables {
 #[derive(Clone)]
 pub struct GpuScene {
     pub(crate) gpu: Arc<Gpu>,
-    /// The bindings before `scene`, in order.
-    fixed: Vec<wgpu::Buffer>,
+    tree: wgpu::Buffer,
+    facets: wgpu::Buffer,
+    words: wgpu::Buffer,
+    records: wgpu::Buffer,
+    /// Words before those of the light map.
+    unlit_words: u64,
     params: SceneParams,
-    /// Bytes of the light map.
-    light_bytes: u64,
     pub(crate) has_masks: bool,
     pub(crate) layout: wgpu::BindGroupLayout,
     pub(crate) group: wgpu::BindGroup,
 }
 
-/// Bindings of the group.
-const BINDINGS: u32 = 16;
-
 impl GpuScene {
     /// Uploads what `world` is made of.
     pub fn new(gpu: Arc<Gpu>, world: &World) -> Result<Self> {
-        let available = gpu.device.limits().max_storage_buffers_per_shader_stage;
-        if available < BINDINGS + 4 {
-            return Err(Error::Request(format!(
-                "GPU \"{}\" binds {available} buffers to a kernel, too few for a scene; use --device cpu",
-                gpu.adapter.name
-            )));
-        }
         if let Some(material) = world.scene.materials.iter().find(|m| tilts(&m.bsdf) > 1) {
             return Err(Error::Request(format!(
                 "material \"{}\": the GPU has no bump or normal map within another; use --device cpu",
@@ -128,54 +142,19 @@ impl GpuScene {
             let message = "the GPU has no projector and no spot with a texture; use --device cpu";
             return Err(Error::Request(message.into()));
         }
-        let (nodes, corners) = tree(world)?;
-        let facets: Vec<[u32; 28]> = world.facets.iter().map(words).collect();
-        let (mut textures, mut tables) = (Textures::default(), Tables::default());
-        let sobol = tables.words((0..16).flat_map(|i| (0..4).map(move |d| sobol_burley::parts::sobol_rev(1 << (31 - i), d))));
-        let albedos = [Distribution::Beckmann, Distribution::Ggx].map(|d| albedo::table(d).iter().flat_map(|v| v.to_array()));
-        let albedo = tables.floats(albedos.into_iter().flatten());
-        let mut models = Models { list: Vec::new(), textures: &mut textures, tables: &mut tables };
-        let materials: Vec<_> = world.scene.materials.iter().map(|m| models.material(m)).collect();
-        let models = models.list;
-        let emitters = emitters(world, &mut textures, &mut tables);
-        let environments = environments(world, &mut textures, &mut tables);
-        if let Some(what) = textures.unknown {
-            return Err(Error::Request(format!("the GPU has no {what}; use --device cpu")));
-        }
-        let sun_list = tables.words(world.lights.suns.iter().copied());
-        let params = SceneParams {
-            environments: environments.len() as u32,
-            suns: world.lights.suns.len() as u32,
-            sun_list,
-            has_near: u32::from(!world.lights.tree.is_empty()),
-            sobol,
-            albedo,
-            light_width: 0,
-            light_height: 0,
-            light_back: NONE,
-        };
-        let near = near(world);
-        let tree = &world.lights.tree;
-        let content: [(&str, &[u8]); 13] = [
-            ("the scene's tree", cast_slice(&nodes.nodes)),
-            ("the scene's triangles", cast_slice(&corners)),
-            ("the scene's surfaces", cast_slice(&facets)),
-            ("the scene's materials", cast_slice(&materials)),
-            ("the scene's scattering models", cast_slice(&models)),
-            ("the scene's textures", cast_slice(&textures.list)),
-            ("the textures' pixels", cast_slice(&textures.pixels)),
-            ("the scene's tables", cast_slice(&tables.0)),
-            ("the scene's emitters", cast_slice(&emitters)),
-            ("the scene's lamps", cast_slice(&near)),
-            ("the hierarchy of lamps", cast_slice(&tree.nodes)),
-            ("the lamps' places", cast_slice(&tree.place)),
-            ("the environments", cast_slice(&environments)),
-        ];
-        let fixed = content.iter().map(|(label, bytes)| gpu.upload(label, bytes)).collect::<Result<Vec<_>>>()?;
-        let layout = gpu.checked(|| layout(&gpu.device, "scene", BINDINGS, 0))?;
+        let (tree, corners) = tree(world)?;
+        let facets: Vec<[u32; 28]> = world.facets.iter().map(words_of).collect();
+        let (mut records, mut words) = (Records::default(), Words::default());
+        let params = SceneParams { corners, ..params(world, &mut records, &mut words)? };
+        let tree = gpu.upload("the scene's tree", cast_slice(&tree))?;
+        let facets = gpu.upload("the scene's surfaces", cast_slice(&facets))?;
+        let unlit_words = words.0.len() as u64;
+        let words = gpu.upload("the scene's textures", cast_slice(&words.0))?;
+        let records = gpu.upload("the scene's materials and emitters", cast_slice(&records.0))?;
+        let layout = gpu.checked(|| layout(&gpu.device, "scene", BINDINGS.iter().map(|(_, access)| *access)))?;
+        let group = group(&gpu, &layout, params, [&tree, &facets, &words, &records])?;
         let has_masks = world.scene.materials.iter().any(|m| m.opacity.is_some());
-        let group = group(&gpu, &layout, &fixed, params, &[], &[])?;
-        Ok(Self { gpu, fixed, params, light_bytes: 0, has_masks, layout, group })
+        Ok(Self { gpu, tree, facets, words, records, unlit_words, params, has_masks, layout, group })
     }
 
     /// A scene on a device, with a light map where there is one.
@@ -189,22 +168,31 @@ impl GpuScene {
 
     /// The same scene with a light map to look diffuse light up in.
     pub fn with_lightmap(&self, map: &LightMap) -> Result<Self> {
-        let floats = |side: &[crate::base::math::Rgb]| side.iter().flat_map(|c| c.to_array()).collect::<Vec<f32>>();
-        let mut texels = floats(&map.front);
-        let light_back = map.back.as_ref().map_or(NONE, |_| texels.len() as u32);
-        texels.extend(map.back.iter().flat_map(|back| floats(back)));
+        let gpu = &self.gpu;
+        let unlit = self.unlit_words as u32;
+        let texels = |side: &[crate::base::math::Rgb]| side.iter().flat_map(|c| c.to_array()).collect::<Vec<f32>>();
+        let mut light = Words::default();
+        let light_front = unlit + light.floats(texels(&map.front));
+        let light_back = map.back.as_ref().map_or(NONE, |back| unlit + light.floats(texels(back)));
+        let light_corners = unlit + light.floats(map.corners.iter().flatten().flat_map(|p| p.to_array()));
         let [light_width, light_height] = map.size;
-        let params = SceneParams { light_width, light_height, light_back, ..self.params };
-        let corners: Vec<[f32; 2]> = map.corners.iter().flatten().map(|p| p.to_array()).collect();
-        let group = group(&self.gpu, &self.layout, &self.fixed, params, &texels, &corners)?;
-        let (gpu, layout) = (self.gpu.clone(), self.layout.clone());
-        let light_bytes = (size_of_val(texels.as_slice()) + size_of_val(corners.as_slice())) as u64;
-        Ok(Self { gpu, fixed: self.fixed.clone(), params, light_bytes, has_masks: self.has_masks, layout, group })
+        let params = SceneParams { light_width, light_height, light_front, light_back, light_corners, ..self.params };
+        let before = self.unlit_words * size_of::<u32>() as u64;
+        let light: &[u8] = cast_slice(&light.0);
+        let words = gpu.output("the scene's textures and light map", before + light.len() as u64)?;
+        gpu.checked(|| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(&self.words, 0, &words, 0, before);
+            gpu.queue.write_buffer(&words, before, light);
+            gpu.queue.submit([encoder.finish()]);
+        })?;
+        let group = group(gpu, &self.layout, params, [&self.tree, &self.facets, &words, &self.records])?;
+        Ok(Self { words, params, group, ..self.clone() })
     }
 
     /// What it takes on the device, bytes.
     pub(crate) fn bytes(&self) -> u64 {
-        self.fixed.iter().map(wgpu::Buffer::size).sum::<u64>() + self.light_bytes
+        [&self.tree, &self.facets, &self.words, &self.records].map(wgpu::Buffer::size).iter().sum()
     }
 
     /// Whether there is a light map to look diffuse light up in.
@@ -218,41 +206,53 @@ impl GpuScene {
     }
 }
 
-/// A layout of `reads` buffers to read, and after them `writes` to write.
-pub(crate) fn layout(device: &wgpu::Device, label: &str, reads: u32, writes: u32) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = (0..reads + writes)
-        .map(|binding| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only: binding < reads },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        })
-        .collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, params: SceneParams, buffers: [&wgpu::Buffer; 4]) -> Result<wgpu::BindGroup> {
+    let params = gpu.uniform("the scene's parameters", &params)?;
+    let [tree, facets, words, records] = buffers;
+    gpu.checked(|| gpu.group(layout, &[&params, tree, facets, words, records]))
 }
 
-fn group(
-    gpu: &Gpu,
-    layout: &wgpu::BindGroupLayout,
-    fixed: &[wgpu::Buffer],
-    params: SceneParams,
-    light_texels: &[f32],
-    light_corners: &[[f32; 2]],
-) -> Result<wgpu::BindGroup> {
-    let params = gpu.upload("the scene's parameters", bytemuck::bytes_of(&params))?;
-    let texels = gpu.upload("the light map", cast_slice(light_texels))?;
-    let corners = gpu.upload("the light map's charts", cast_slice(light_corners))?;
-    let buffers: Vec<_> = fixed.iter().chain([&params, &texels, &corners]).collect();
-    gpu.checked(|| gpu.group(layout, &buffers))
+/// Fills the lists of records and of words; where they begin. Without a light map.
+fn params(world: &World, records: &mut Records, words: &mut Words) -> Result<SceneParams> {
+    let sobol = words.extend((0..16).flat_map(|i| (0..4).map(move |d| sobol_burley::parts::sobol_rev(1 << (31 - i), d))));
+    let albedos = [Distribution::Beckmann, Distribution::Ggx].map(|d| albedo::table(d).iter().flat_map(|v| v.to_array()));
+    let albedo = words.floats(albedos.into_iter().flatten());
+    let sun_list = words.extend(world.lights.suns.iter().copied());
+    let mut textures = Textures::default();
+    let mut models = Models { list: Vec::new(), textures: &mut textures, words: &mut *words };
+    let materials: Vec<_> = world.scene.materials.iter().map(|m| models.material(m)).collect();
+    let models = models.list;
+    let emitters = emitters(world, &mut textures, words);
+    let environments = environments(world, &mut textures, words);
+    if let Some(what) = textures.unknown {
+        return Err(Error::Request(format!("the GPU has no {what}; use --device cpu")));
+    }
+    Ok(SceneParams {
+        materials: records.list(&materials),
+        models: records.list(&models),
+        textures: records.list(&textures.list),
+        emitters: records.list(&emitters),
+        near: records.list(&near(world)),
+        light_nodes: records.list(&world.lights.tree.nodes),
+        environments: records.list(&environments),
+        environment_count: environments.len() as u32,
+        has_near: u32::from(!world.lights.tree.is_empty()),
+        suns: world.lights.suns.len() as u32,
+        corners: 0,
+        sun_list,
+        sobol,
+        albedo,
+        light_width: 0,
+        light_height: 0,
+        light_front: NONE,
+        light_back: NONE,
+        light_corners: NONE,
+    })
 }
 
-/// The compressed tree, and three vectors a primitive: the bits of its corners, with the triangle, its material if that lets rays through,
-/// and its object.
-fn tree(world: &World) -> Result<(CwBvh, Vec<[u32; 4]>)> {
+/// The compressed tree, five entries a node, and from the given entry on three vectors a primitive: the bits of its corners, with the
+/// triangle, its material if that lets rays through, and its object.
+fn tree(world: &World) -> Result<(Vec<[u32; 4]>, u32)> {
     let geometry = &world.scene.geometry;
     let (tree, triangles) = world.bvh.compressed(geometry);
     if depth(&tree) > STACK {
@@ -260,22 +260,21 @@ fn tree(world: &World) -> Result<(CwBvh, Vec<[u32; 4]>)> {
             "the scene's tree is more than {STACK} nodes deep, too deep for the GPU; use --device cpu"
         )));
     }
-    let corners = triangles
-        .iter()
-        .flat_map(|&t| {
-            let [a, b, c] = geometry.corners(t);
-            let object = geometry.triangle_object[t as usize];
-            let material = geometry.objects[object as usize].material;
-            let masked = world.scene.materials[material as usize].opacity.is_some();
-            let material = if masked { material } else { NONE };
-            [(a, t), (b, material), (c, object)].map(|(p, word)| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits(), word])
-        })
-        .collect();
-    Ok((tree, corners))
+    let mut entries: Vec<[u32; 4]> = cast_slice(&tree.nodes).to_vec();
+    let corners = entries.len() as u32;
+    entries.extend(triangles.iter().flat_map(|&t| {
+        let [a, b, c] = geometry.corners(t);
+        let object = geometry.triangle_object[t as usize];
+        let material = geometry.objects[object as usize].material;
+        let masked = world.scene.materials[material as usize].opacity.is_some();
+        let material = if masked { material } else { NONE };
+        [(a, t), (b, material), (c, object)].map(|(p, word)| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits(), word])
+    }));
+    Ok((entries, corners))
 }
 
 /// A facet's seven vectors.
-fn words(facet: &Facet) -> [u32; 28] {
+fn words_of(facet: &Facet) -> [u32; 28] {
     let mut words = [0; 28];
     let vectors = facet.corners.iter().chain(&facet.normals).flat_map(|v| v.to_array());
     let floats = vectors.chain(facet.uvs.iter().flat_map(|v| v.to_array()));
@@ -297,21 +296,4 @@ fn depth(tree: &CwBvh) -> usize {
         todo.extend((0..children).map(|i| ((node.child_base_idx + i) as usize, level + 1)));
     }
     deepest
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-    use crate::transport::light_tree::Node;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(RAYS, SceneParams as "SceneParams" {
-            environments, suns, sun_list, has_near, sobol, albedo, light_width, light_height, light_back
-        });
-        check!(RAYS, Node as "LightNode" {
-            centre, radius_sq, axis, cos_spread, sin_spread, cos_reach, power, children, parent
-        });
-    }
 }

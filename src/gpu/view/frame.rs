@@ -14,6 +14,7 @@ use crate::scene::Camera;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::layers::LayerImages;
+use glam::Vec4;
 use std::sync::Arc;
 
 /// A frame, read back.
@@ -74,7 +75,7 @@ impl Baseline {
             let albedos = wants_albedo.then_some(1.0);
             self.gbuffer.run(&scene, &mut commands, &fine, &target.view, albedos)?;
             fill(&mut commands, &fine, &target)?;
-            self.composite.layers(gpu, &mut commands, (&target.view, &fine), (&target.glossy, None), &target.layers)?;
+            self.composite.layers(gpu, &mut commands, &target.view, (&target.glossy, None), &target.layers)?;
             let passes = commands.finish()?;
             let mut clock = Clock::start();
             let ([emission, diffuse, glossy], _) = target.layers.read(gpu)?;
@@ -91,7 +92,7 @@ impl Target {
         let pixels = area(size);
         Ok(Self {
             view: View::new(gpu, size)?,
-            glossy: gpu.output("the glossy pixels", 16 * pixels)?,
+            glossy: gpu.output("the glossy pixels", size_of::<Vec4>() as u64 * pixels)?,
             layers: Layers::new(gpu, pixels / u64::from(supersample * supersample))?,
         })
     }

@@ -1,20 +1,20 @@
 //! The G-buffer: the twin of [`crate::view::gbuffer`].
 
-use super::View;
+use super::{PIXEL, REFLECTED, SHADING, View};
 use crate::Result;
-use crate::gpu::camera::GpuCamera;
+use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, groups, shader};
-use crate::gpu::scene::{GpuScene, MATERIALS, PATHS, RAYS};
+use crate::gpu::kernel::Kernel;
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::scene::Camera;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use bytemuck::{Pod, Zeroable};
 
-/// Edges of a workgroup, pixels.
-const WORKGROUP: [u32; 2] = [8, 8];
 /// Among the vertices: the triangle is a plane.
-const NONE: u32 = u32::MAX;
+const NONE: u32 = crate::gpu::scene::NONE;
 
 /// `Params` of gbuffer.wgsl.
 #[repr(C)]
@@ -34,10 +34,32 @@ struct VertexCurvature {
     d1: [f32; 3],
 }
 
-/// What the kernels are made of.
-fn source() -> String {
-    [RAYS, MATERIALS, PATHS, shader!("camera", "camera_ray", "view", "mirror", "gbuffer")].concat()
-}
+/// The surfaces seen.
+pub(crate) const GBUFFER: KernelSpec = KernelSpec {
+    file: "shared/gbuffer.wgsl",
+    twin: "src/view/gbuffer.rs: gbuffer",
+    workgroup: [8, 8],
+    scene: true,
+    bindings: &[
+        ("params", Uniform),
+        ("curved_vertices", Read),
+        ("curvatures", Read),
+        ("view", ReadWrite),
+        ("shading", ReadWrite),
+    ],
+    structs: &[&PARAMS, &CAMERA, &VERTEX_CURVATURE, &PIXEL, &REFLECTED, &SHADING],
+};
+/// Their light and albedos.
+pub(crate) const VIEW_FACTORS: KernelSpec = KernelSpec {
+    file: "shared/view_factors.wgsl",
+    twin: "src/method/glossy_probes/gather.rs: view_albedo",
+    workgroup: [8, 8],
+    scene: true,
+    bindings: &[("params", Uniform), ("view", Read), ("shading", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &SHADING],
+};
+const PARAMS: StructLayout = layout!(Params as "Params" { camera, roughness_scale });
+const VERTEX_CURVATURE: StructLayout = layout!(VertexCurvature as "VertexCurvature" { k1, k2, d1 });
 
 /// The kernels, with the scene's curvatures.
 pub(crate) struct GBuffer {
@@ -49,7 +71,6 @@ pub(crate) struct GBuffer {
 
 impl GBuffer {
     pub(crate) fn new(scene: &GpuScene, world: &World, curvature: &CurvatureMap) -> Result<Self> {
-        let source = source();
         let geometry = &world.scene.geometry;
         let is_plane = |t: usize| {
             let flat = |&i: &u32| curvature.k1[i as usize] == 0.0 && curvature.k2[i as usize] == 0.0;
@@ -61,8 +82,8 @@ impl GBuffer {
         let curvatures: Vec<_> = map.map(|((&k1, &k2), d1)| VertexCurvature { k1, k2, d1: d1.to_array() }).collect();
         let gpu = &scene.gpu;
         Ok(Self {
-            gbuffer: Kernel::in_scene(scene, &source, "gbuffer", [3, 6], &[])?,
-            view_factors: Kernel::in_scene(scene, &source, "view_factors", [3, 2], &[])?,
+            gbuffer: Kernel::in_scene(scene, &GBUFFER, &[])?,
+            view_factors: Kernel::in_scene(scene, &VIEW_FACTORS, &[])?,
             curved_vertices: gpu.upload("the curved triangles", bytemuck::cast_slice(&vertices))?,
             curvatures: gpu.upload("the scene's curvatures", bytemuck::cast_slice(&curvatures))?,
         })
@@ -73,7 +94,7 @@ impl GBuffer {
         self.curved_vertices.size() + self.curvatures.size()
     }
 
-    /// Fills a view's planes; its glossy albedos where the probes' `roughness_scale` is given.
+    /// Fills a view, but for its mirror hits; its glossy albedos where the probes' `roughness_scale` is given.
     pub(crate) fn run(
         &self,
         scene: &GpuScene,
@@ -84,35 +105,10 @@ impl GBuffer {
     ) -> Result<()> {
         let gpu = &scene.gpu;
         let params = Params { camera: camera.into(), roughness_scale: roughness_scale.unwrap_or(-1.0), padding: [0; 3] };
-        let params = gpu.upload("the G-buffer's parameters", bytemuck::bytes_of(&params))?;
-        let groups = groups(view.size, WORKGROUP);
-        let (hits, materials) = (&view.hits, &view.guides.materials);
-        let buffers = [
-            &params,
-            &self.curved_vertices,
-            &self.curvatures,
-            hits,
-            &view.positions,
-            &view.guides.normals,
-            &view.curvatures,
-            materials,
-            &view.emission,
-        ];
-        commands.run("gbuffer", &self.gbuffer, &buffers, groups);
-        commands.run("gbuffer", &self.view_factors, &[&params, hits, materials, &view.diffuse, &view.albedos], groups);
+        let params = gpu.uniform("the G-buffer's parameters", &params)?;
+        let View { size, pixels, shading } = view;
+        commands.run("gbuffer", &self.gbuffer, &[&params, &self.curved_vertices, &self.curvatures, pixels, shading], *size);
+        commands.run("gbuffer", &self.view_factors, &[&params, pixels, shading], *size);
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        let source = source();
-        check!(&source, Params as "Params" { camera, roughness_scale });
-        check!(&source, VertexCurvature as "VertexCurvature" { k1, k2, d1 });
     }
 }

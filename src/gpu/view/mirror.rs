@@ -1,30 +1,37 @@
 //! Mirror rays: the twin of [`crate::view::mirror`].
 
-use super::View;
+use super::{PIXEL, REFLECTED, View};
 use crate::Result;
-use crate::gpu::camera::GpuCamera;
+use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, groups, shader};
-use crate::gpu::scene::{GpuScene, MATERIALS, RAYS};
+use crate::gpu::kernel::Kernel;
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{ReadWrite, Uniform};
+use crate::gpu::spec::KernelSpec;
 use crate::scene::Camera;
 
-/// Edges of a workgroup, pixels.
-const WORKGROUP: [u32; 2] = [8, 8];
-
 /// The kernel.
+pub(crate) const MIRROR_PASS: KernelSpec = KernelSpec {
+    file: "shared/mirror_pass.wgsl",
+    twin: "src/view/mirror.rs: mirror_pass",
+    workgroup: [8, 8],
+    scene: true,
+    bindings: &[("camera", Uniform), ("view", ReadWrite)],
+    structs: &[&CAMERA, &PIXEL, &REFLECTED],
+};
+
+/// The kernel, compiled.
 pub(crate) struct Mirror(Kernel);
 
 impl Mirror {
     pub(crate) fn new(scene: &GpuScene) -> Result<Self> {
-        let source = [RAYS, MATERIALS, shader!("camera", "camera_ray", "view", "mirror")].concat();
-        Ok(Self(Kernel::in_scene(scene, &source, "mirror_pass", [3, 1], &[])?))
+        Ok(Self(Kernel::in_scene(scene, &MIRROR_PASS, &[])?))
     }
 
-    /// Fills the reflected hits of a view whose other planes are there.
+    /// Fills the reflected hits of a view whose pixels are there.
     pub(crate) fn run(&self, scene: &GpuScene, commands: &mut Commands, camera: &Camera, view: &View) -> Result<()> {
-        let camera = scene.gpu.upload("the camera", bytemuck::bytes_of(&GpuCamera::from(camera)))?;
-        let buffers = [&camera, &view.hits, &view.guides.materials, &view.reflected];
-        commands.run("mirror", &self.0, &buffers, groups(view.size, WORKGROUP));
+        let camera = scene.gpu.uniform("the camera", &GpuCamera::from(camera))?;
+        commands.run("mirror", &self.0, &[&camera, &view.pixels], view.size);
         Ok(())
     }
 }

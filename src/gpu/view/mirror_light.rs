@@ -1,17 +1,17 @@
 //! What mirrors show of lamps and diffuse light: the twin of [`crate::view::mirror_light`].
 
-use super::View;
+use super::{PIXEL, REFLECTED, View};
 use crate::Result;
-use crate::gpu::camera::GpuCamera;
+use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, bands, groups, shader};
-use crate::gpu::scene::{GpuScene, MATERIALS, PATHS, RAYS};
+use crate::gpu::kernel::{Kernel, bands};
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::scene::Camera;
 use crate::view::mirror_light::ChainParams;
 use bytemuck::{Pod, Zeroable};
 
-/// Edges of a workgroup, pixels.
-const WORKGROUP: [u32; 2] = [8, 8];
 /// Most mirror rays of a dispatch: well below a second on a slow GPU.
 const MOST_RAYS: u64 = 1 << 22;
 
@@ -26,16 +26,23 @@ struct Params {
     max_first_alpha: f32,
 }
 
-fn source() -> String {
-    [RAYS, MATERIALS, PATHS, shader!("camera", "camera_ray", "view", "mirror", "gbuffer", "mirror_light")].concat()
-}
-
 /// The kernel.
+pub(crate) const MIRROR_LIGHT: KernelSpec = KernelSpec {
+    file: "shared/mirror_light.wgsl",
+    twin: "src/view/mirror_light.rs: mirror_chain",
+    workgroup: [8, 8],
+    scene: true,
+    bindings: &[("chain", Uniform), ("view", Read), ("mirrored_light", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED],
+};
+const PARAMS: StructLayout = layout!(Params as "MirrorLightParams" { camera, first_row, rays, max_alpha, max_first_alpha });
+
+/// The kernel, compiled.
 pub(crate) struct MirrorLight(Kernel);
 
 impl MirrorLight {
     pub(crate) fn new(scene: &GpuScene) -> Result<Self> {
-        Ok(Self(Kernel::in_scene(scene, &source(), "mirror_light", [3, 1], &[])?))
+        Ok(Self(Kernel::in_scene(scene, &MIRROR_LIGHT, &[])?))
     }
 
     /// Fills `out`, 16 bytes a pixel, for the pixels whose alpha is `max_first_alpha` at most: radiance along the mirror direction, and the
@@ -51,21 +58,9 @@ impl MirrorLight {
         for (first_row, rows) in bands(view.size, MOST_RAYS, u64::from(params.rays)) {
             let ChainParams { rays, max_alpha } = *params;
             let params = Params { camera: camera.into(), first_row, rays, max_alpha, max_first_alpha };
-            let params = scene.gpu.upload("the mirror rays' parameters", bytemuck::bytes_of(&params))?;
-            let buffers = [&params, &view.hits, &view.guides.materials, out];
-            commands.run("mirror", &self.0, &buffers, groups([view.size[0], rows], WORKGROUP));
+            let params = scene.gpu.uniform("the mirror rays' parameters", &params)?;
+            commands.run("mirror", &self.0, &[&params, &view.pixels, out], [view.size[0], rows]);
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(&source(), Params as "MirrorLightParams" { camera, first_row, rays, max_alpha, max_first_alpha });
     }
 }

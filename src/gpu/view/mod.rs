@@ -1,4 +1,4 @@
-//! A view on the device, a pixel an entry in each of its planes: the twin of [`crate::view::gbuffer::GBuffer`] and of [`Reflected`].
+//! A view on the device, a record a pixel: the twin of [`crate::view::gbuffer::GBuffer`] and of [`Reflected`].
 
 pub(crate) mod composite;
 pub mod frame;
@@ -8,90 +8,83 @@ pub(crate) mod mirror_light;
 
 use super::Gpu;
 use super::kernel::area;
+use super::spec::{StructLayout, layout};
 use crate::Result;
 use crate::view::mirror::Reflected;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// A reflected hit as shaders have it.
+/// `Reflected` of view.wgsl.
 #[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct GpuReflected {
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+pub(crate) struct GpuReflected {
     point: [f32; 3],
     material: u32,
 }
 
-/// What the frame after this one looks at, too.
-pub(crate) struct Guides {
-    /// Shading normal on the camera's side, and distance to the camera.
-    pub(crate) normals: wgpu::Buffer,
-    /// Materials; [`crate::method::glossy_probes::filter::NOT_GLOSSY`] where no probe is asked.
-    pub(crate) materials: wgpu::Buffer,
+/// `Pixel` of view.wgsl: what passes look for most often.
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+pub(crate) struct GpuPixel {
+    pub(crate) p: [f32; 3],
+    pub(crate) alpha: f32,
+    pub(crate) n: [f32; 3],
+    pub(crate) depth: f32,
+    pub(crate) reflected: GpuReflected,
+    /// [`crate::method::glossy_probes::filter::NOT_GLOSSY`] where no probe is asked.
+    pub(crate) material: u32,
+    pub(crate) triangle: u32,
+    pub(crate) u: f32,
+    pub(crate) v: f32,
 }
 
-impl Guides {
-    pub(crate) fn new(gpu: &Gpu, pixels: u64) -> Result<Self> {
-        Ok(Self { normals: gpu.output("normals", 16 * pixels)?, materials: gpu.output("materials", 4 * pixels)? })
-    }
+/// `Shading` of view.wgsl: what they take from there in the end.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(crate) struct GpuShading {
+    pub(crate) curvature: [f32; 4],
+    emission: [f32; 3],
+    padding0: u32,
+    diffuse: [f32; 3],
+    padding1: u32,
+    albedo: [f32; 3],
+    padding2: u32,
 }
 
-/// The planes.
+pub(crate) const REFLECTED: StructLayout = layout!(GpuReflected as "Reflected" { point, material });
+pub(crate) const PIXEL: StructLayout = layout!(GpuPixel as "Pixel" { p, alpha, n, depth, reflected, material, triangle, u, v });
+pub(crate) const SHADING: StructLayout = layout!(GpuShading as "Shading" { curvature, emission, diffuse, albedo });
+
+/// The pixels that a frame looks at, and those of the frame before.
+pub(crate) fn pixels(gpu: &Gpu, size: [u32; 2]) -> Result<wgpu::Buffer> {
+    gpu.output("the view", size_of::<GpuPixel>() as u64 * area(size))
+}
+
+/// The records.
 pub(crate) struct View {
     /// Width and height, pixels.
     pub(crate) size: [u32; 2],
-    /// What the later passes look at most.
-    pub(crate) guides: Guides,
-    /// What the camera's rays meet.
-    pub(crate) hits: wgpu::Buffer,
-    /// The surface seen, and alpha.
-    pub(crate) positions: wgpu::Buffer,
-    /// Principal curvatures, and the first one's direction in the tangents of [`crate::base::math::Frame::from_normal`].
-    pub(crate) curvatures: wgpu::Buffer,
-    /// Mirror hits.
-    pub(crate) reflected: wgpu::Buffer,
-    /// Radiance emitted towards the camera; the environment's where nothing is seen.
-    pub(crate) emission: wgpu::Buffer,
-    /// Radiance of the diffuse lobe, by the light map.
-    pub(crate) diffuse: wgpu::Buffer,
-    /// Directional albedo of the glossy lobe at the probes' roughness.
-    pub(crate) albedos: wgpu::Buffer,
+    pub(crate) pixels: wgpu::Buffer,
+    pub(crate) shading: wgpu::Buffer,
 }
 
 impl View {
-    /// Bytes a pixel, with the [`Guides`].
-    pub(crate) const BYTES: u64 = 8 * 16 + 4;
+    /// Bytes a pixel.
+    pub(crate) const BYTES: u64 = (size_of::<GpuPixel>() + size_of::<GpuShading>()) as u64;
 
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self> {
-        let pixels = area(size);
-        let plane = |label| gpu.output(label, 16 * pixels);
-        Ok(Self {
-            size,
-            guides: Guides::new(gpu, pixels)?,
-            hits: plane("hits")?,
-            positions: plane("positions")?,
-            curvatures: plane("curvatures")?,
-            reflected: plane("reflected hits")?,
-            emission: plane("emission")?,
-            diffuse: plane("diffuse factors")?,
-            albedos: plane("glossy albedos")?,
-        })
+        let shading = gpu.output("the view's shading", size_of::<GpuShading>() as u64 * area(size))?;
+        Ok(Self { size, pixels: pixels(gpu, size)?, shading })
     }
 
     /// The mirror hits.
     pub(crate) fn read_reflected(&self, gpu: &Gpu) -> Result<Vec<Reflected>> {
-        let read: Vec<GpuReflected> = gpu.read(&self.reflected)?;
-        Ok(read.iter().map(|r| Reflected { point: Vec3::from(r.point), material: r.material as u16 }).collect())
+        let reflected = |p: &GpuPixel| Reflected { point: Vec3::from(p.reflected.point), material: p.reflected.material as u16 };
+        Ok(gpu.read::<GpuPixel>(&self.pixels)?.iter().map(reflected).collect())
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::kernel::shader;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(shader!("math", "view"), GpuReflected as "Reflected" { point, material });
+    /// Both principal curvatures.
+    pub(crate) fn read_curvatures(&self, gpu: &Gpu) -> Result<Vec<[f32; 2]>> {
+        Ok(gpu.read::<GpuShading>(&self.shading)?.iter().map(|s| [s.curvature[0], s.curvature[1]]).collect())
     }
 }

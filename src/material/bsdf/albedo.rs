@@ -12,9 +12,9 @@ use glam::Vec2;
 use std::sync::OnceLock;
 
 /// Cosines in the table, from 0 to 1.
-const COSINES: usize = 33;
+pub(crate) const COSINES: usize = 33;
 /// Alphas in the table, from 0 to 1; linear in the square root, for the albedo changes fastest at small ones.
-const ALPHAS: usize = 17;
+pub(crate) const ALPHAS: usize = 17;
 /// The index of refraction that the table's cosines are exact for: a common plastic.
 const REFERENCE_ETA: f32 = 1.5;
 /// Nodes of the quadrature behind an entry, each way.

@@ -117,12 +117,13 @@ fn centred(u: f32) -> f32 {
     (2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6)
 }
 
+pub(crate) const FRAC_1_SQRT_PI: f32 = 0.564_189_6;
+
 /// Slope along the view of a visible Beckmann facet (alpha = 1) seen under the angle with tangent `tan`.
 ///
 /// Its density is proportional to (1 - x tan) exp(-x²) for x < 1/tan. In b = erf(x) the distribution function is
 /// proportional to 1 + b + tan/√π · exp(-x²), which is smooth enough for Newton's method (Jakob 2014).
 fn beckmann_slope(tan: f32, u: f32) -> f32 {
-    const FRAC_1_SQRT_PI: f32 = 0.564_189_6;
     if tan < 1e-5 {
         return erf_inv(centred(u));
     }

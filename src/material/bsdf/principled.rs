@@ -15,13 +15,13 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Smallest alpha of the main lobe before [`Query::roughness_scale`] (Mitsuba's floor).
-const SPECULAR_ALPHA_MIN: f32 = 1e-3;
+pub(crate) const SPECULAR_ALPHA_MIN: f32 = 1e-3;
 /// Share of the clearcoat that reflects.
-const CLEARCOAT_STRENGTH: f32 = 0.25;
+pub(crate) const CLEARCOAT_STRENGTH: f32 = 0.25;
 /// Fixed alpha of the clearcoat's shadowing.
-const CLEARCOAT_SHADOWING_ALPHA: f32 = 0.25;
+pub(crate) const CLEARCOAT_SHADOWING_ALPHA: f32 = 0.25;
 /// Reflectance of the clearcoat at normal incidence.
-const CLEARCOAT_F0: f32 = 0.04;
+pub(crate) const CLEARCOAT_F0: f32 = 0.04;
 
 /// Parameters as in a scene file; all but `eta` and `base_color` lie in [0, 1].
 #[derive(Debug, Clone, serde::Serialize)]

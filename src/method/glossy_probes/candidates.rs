@@ -30,8 +30,8 @@ pub struct Candidates {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Seen {
-    reflected_point: Vec3,
-    reflected_material: u16,
+    pub(crate) reflected_point: Vec3,
+    pub(crate) reflected_material: u16,
     /// Material of the reflector.
     pub material: u16,
 }

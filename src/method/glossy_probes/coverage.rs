@@ -42,13 +42,13 @@ impl CoverageParams {
 
 // No measurement told values about these apart.
 /// Least cosine between the normals of one surface.
-const MIN_NORMAL_COS: f32 = 0.9;
+pub(crate) const MIN_NORMAL_COS: f32 = 0.9;
 /// How far from the other's plane a point of one surface may lie, as a fraction of its depth.
-const DEPTH_TOLERANCE: f32 = 0.02;
+pub(crate) const DEPTH_TOLERANCE: f32 = 0.02;
 /// Alpha up to which what a surface mirrors counts as an edge. (Twice the rays at 0.15, for nothing.)
-const SHARP_ALPHA: f32 = 0.05;
+pub(crate) const SHARP_ALPHA: f32 = 0.05;
 /// Most that two reflected points of one surface differ, as a fraction of their distance.
-const REFLECTED_TOLERANCE: f32 = 0.05;
+pub(crate) const REFLECTED_TOLERANCE: f32 = 0.05;
 
 /// What the passes have found at a view's sub-pixels.
 pub struct SubPixels<'a> {
@@ -140,10 +140,11 @@ pub fn covered_pixels(
     (0..width * height).into_par_iter().with_min_len(width).filter_map(of).collect()
 }
 
+pub(crate) const GOLDEN_RATIO: f32 = 0.618_034;
+
 /// Point `k` of `n` in the unit square: a lattice of the golden ratio, whose points lie in as many columns and rows as there are points.
 /// (Along a bar that is nearly upright, a grid of 4 x 4 has but four columns to tell its width by.)
 fn lattice_point(k: u32, n: u32) -> Vec2 {
-    const GOLDEN_RATIO: f32 = 0.618_034;
     Vec2::new((k as f32 + 0.5) / n as f32, (k as f32 * GOLDEN_RATIO + 0.5).fract())
 }
 

@@ -83,11 +83,11 @@ impl PerturbParams {
 }
 
 /// Smallest cosine of incidence that is told from grazing.
-const MIN_COS: f32 = 1e-3;
+pub(crate) const MIN_COS: f32 = 1e-3;
 /// Longest Newton step, as a multiple of the reflector's smallest radius; half the way from x comes on top.
-const MAX_STEP: f32 = 0.5;
+pub(crate) const MAX_STEP: f32 = 0.5;
 /// Shortest distance to the eye or the reflected point, m.
-const MIN_DISTANCE: f32 = 1e-4;
+pub(crate) const MIN_DISTANCE: f32 = 1e-4;
 
 /// G = ∂F/∂u of the module's text: the second derivative of the path's length along the principal directions of the reflector,
 /// for the local unit direction `e` to the eye, `c` = 1/r_p + 1/r_q and the principal curvatures `k`.

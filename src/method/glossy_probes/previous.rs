@@ -15,7 +15,7 @@ pub struct Previous {
 }
 
 /// Two depths within this fraction are one surface.
-const DEPTH_TOLERANCE: f32 = 0.02;
+pub(crate) const DEPTH_TOLERANCE: f32 = 0.02;
 
 /// Fills pixels that no probe served with last frame's glossy layer, where it saw the same surface (§5.2).
 /// Returns how many pixels stay without a sample. Their energy stays infinite: they give nothing to the filter.

@@ -40,7 +40,7 @@ pub struct Sample {
 }
 
 /// How much worse than its anchor a pixel's sample may be before it is searched for in full: a factor, and an addend.
-const ANCHOR_TOLERANCE: (f32, f32) = (3.0, 0.1);
+pub(crate) const ANCHOR_TOLERANCE: (f32, f32) = (3.0, 0.1);
 
 /// The sample of least energy of each of `probes` (at most eight), for each pixel of one of [`tiles`], as `eye` sees it. `width`
 /// is the view's.

@@ -3,24 +3,26 @@
 use super::{ImageSpaceGatherParams, spiral};
 use crate::Result;
 use crate::gpu::Gpu;
-use crate::gpu::camera::GpuCamera;
+use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{FAR, Kernel, WORKGROUP, area, bands, groups, shader};
-use crate::gpu::scene::{MATERIALS, PATHS, RAYS};
+use crate::gpu::kernel::{FAR, Kernel, area, bands};
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
 use crate::gpu::view::mirror_light::MirrorLight;
+use crate::gpu::view::{PIXEL, REFLECTED, SHADING};
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
 use crate::transport::World;
 use crate::view::mirror_light::ChainParams;
 use bytemuck::{Pod, Zeroable};
-use glam::Vec2;
+use glam::{Vec2, Vec4};
 use std::sync::Arc;
 
 /// Most taps of a dispatch: well below a second on a slow GPU.
 const MOST_TAPS: u64 = 1 << 26;
 
-/// `ImageSpaceGatherParams` of image_space_gather.wgsl.
+/// `ImageSpaceGatherParams` of gather_image.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Params {
@@ -34,9 +36,25 @@ struct Params {
     padding: [u32; 2],
 }
 
-fn source() -> String {
-    [RAYS, MATERIALS, PATHS, shader!("camera", "camera_ray", "view", "mirror", "gbuffer", "image_space_gather")].concat()
-}
+/// The kernel.
+pub(crate) const GATHER_IMAGE: KernelSpec = KernelSpec {
+    file: "image_space_gather/gather_image.wgsl",
+    twin: "src/method/image_space_gather/mod.rs: gather_image",
+    workgroup: [16, 4],
+    scene: false,
+    bindings: &[
+        ("gathering_params", Uniform),
+        ("view", Read),
+        ("shading", Read),
+        ("mirrored_light", Read),
+        ("pattern", Read),
+        ("glossy", ReadWrite),
+    ],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &SHADING],
+};
+const PARAMS: StructLayout = layout!(Params as "ImageSpaceGatherParams" {
+    camera, first_row, search_samples, samples, max_sigma, min_normal_cos, plane_sigma
+});
 
 /// Renders frames on a device.
 pub struct ImageSpaceGather {
@@ -53,7 +71,7 @@ impl ImageSpaceGather {
         let baseline = Baseline::new(gpu.clone(), world, lightmap, supersample)?;
         Ok(Self {
             mirror_light: MirrorLight::new(&baseline.scene)?,
-            gather_image: Kernel::new(&gpu, &source(), "gather_image")?,
+            gather_image: Kernel::new(&gpu, &GATHER_IMAGE)?,
             mirrored: None,
             baseline,
         })
@@ -77,7 +95,7 @@ impl ImageSpaceGather {
         let fill = |commands: &mut Commands, camera: &Camera, target: &Target| {
             let view = &target.view;
             let size = view.size;
-            let bytes = 16 * area(size);
+            let bytes = size_of::<Vec4>() as u64 * area(size);
             let mirrored = match mirrored.take().filter(|m| m.size() == bytes) {
                 Some(buffer) => mirrored.insert(buffer),
                 None => mirrored.insert(gpu.output("the mirror picture", bytes)?),
@@ -96,32 +114,18 @@ impl ImageSpaceGather {
                     plane_sigma: params.plane_sigma,
                     padding: [0; 2],
                 };
-                gpu.upload("the gather's parameters", bytemuck::bytes_of(&params))
+                gpu.uniform("the gather's parameters", &params)
             };
             let chain = ChainParams { rays: params.rays(), max_alpha: params.max_mirror_alpha };
             mirror_light.run(&scene, commands, (camera, view), (&chain, FAR), mirrored)?;
             let taps = (search.len() + gather.len()) as u64;
             for (first, rows) in bands(size, MOST_TAPS, taps) {
                 let params = &of_band(first)?;
-                let (positions, normals, materials) = (&view.positions, &view.guides.normals, &view.guides.materials);
-                let buffers = [params, positions, normals, materials, &view.albedos, mirrored, &pattern, &target.glossy];
-                commands.run("gather", gather_image, &buffers, groups([size[0], rows], WORKGROUP));
+                let buffers = [params, &view.pixels, &view.shading, mirrored, &pattern, &target.glossy];
+                commands.run("gather", gather_image, &buffers, [size[0], rows]);
             }
             Ok(())
         };
         baseline.frame(camera, true, Commands::new(gpu), fill)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(&source(), Params as "ImageSpaceGatherParams" {
-            camera, first_row, search_samples, samples, max_sigma, min_normal_cos, plane_sigma
-        });
     }
 }

@@ -32,9 +32,9 @@ use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 
 /// Standard deviation of the Gaussian that fits a slice of GGX's lobe, in units of alpha.
-const LOBE_SIGMA: f32 = 0.61;
+pub(crate) const LOBE_SIGMA: f32 = 0.61;
 /// Where a Gaussian ends, in standard deviations.
-const REACH: f32 = 2.5;
+pub(crate) const REACH: f32 = 2.5;
 /// Longest radius that can be asked for, pixels.
 const MAX_RADIUS: f32 = 4096.0;
 /// Most mirror rays in a row: between mirrors that take nothing they would never end.

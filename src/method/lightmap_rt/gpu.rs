@@ -3,13 +3,15 @@
 use super::LightmapRtParams;
 use crate::Result;
 use crate::gpu::Gpu;
-use crate::gpu::camera::GpuCamera;
+use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
-use crate::gpu::follow::{Place, Purpose, SampleSum, Samples, WORKGROUP, most_starts};
-use crate::gpu::kernel::{Kernel, shader};
+use crate::gpu::follow::{PATH_START, Place, Purpose, SampleSum, Samples, most_starts};
+use crate::gpu::kernel::Kernel;
 use crate::gpu::pace::Pace;
-use crate::gpu::scene::{MATERIALS, RAYS};
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
+use crate::gpu::view::{PIXEL, REFLECTED};
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
 use crate::transport::World;
@@ -31,9 +33,25 @@ struct Params {
     padding: [u32; 3],
 }
 
-fn source() -> String {
-    [RAYS, MATERIALS, shader!("camera", "camera_ray", "view", "start", "lightmap_rt")].concat()
-}
+/// Where rays leave the view's pixels.
+pub(crate) const VIEW_STARTS: KernelSpec = KernelSpec {
+    file: "lightmap_rt/view_starts.wgsl",
+    twin: "src/method/lightmap_rt/mod.rs: lightmap_rt",
+    workgroup: [64, 1],
+    scene: false,
+    bindings: &[("params", Uniform), ("view", Read), ("starts", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &PATH_START],
+};
+/// The mean of what they find.
+pub(crate) const MEAN_LIGHT: KernelSpec = KernelSpec {
+    file: "lightmap_rt/mean_light.wgsl",
+    twin: "src/method/lightmap_rt/mod.rs: light_along",
+    workgroup: [64, 1],
+    scene: false,
+    bindings: &[("params", Uniform), ("sums", Read), ("glossy", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA],
+};
+const PARAMS: StructLayout = layout!(Params as "Params" { camera, seed, frame, first_pixel, pixels, samples });
 
 /// Renders frames on a device.
 pub struct LightmapRt {
@@ -51,9 +69,9 @@ impl LightmapRt {
         let purpose = if params.next_event { Purpose::Scattering(GLOSSY) } else { Purpose::Rays(GLOSSY) };
         let place = Place { branch: None, first_set: 0 };
         Ok(Self {
-            starts: Kernel::new(&gpu, &source(), "view_starts")?,
+            starts: Kernel::new(&gpu, &VIEW_STARTS)?,
             follow: Samples::new(baseline.scene.clone(), &params.path(), purpose, place)?,
-            mean: Kernel::new(&gpu, &source(), "mean_light")?,
+            mean: Kernel::new(&gpu, &MEAN_LIGHT)?,
             pace: Pace::new(4096),
             baseline,
         })
@@ -84,34 +102,22 @@ impl LightmapRt {
                     samples,
                     padding: [0; 3],
                 };
-                let params = gpu.upload("the rays' parameters", bytemuck::bytes_of(&params))?;
+                let params = gpu.uniform("the rays' parameters", &params)?;
                 let list = gpu.output("starts of rays", (run * size_of::<PathStart>()) as u64)?;
                 let sums = gpu.output("sums over rays", (run * size_of::<SampleSum>()) as u64)?;
-                let groups = [run.div_ceil(WORKGROUP) as u32, 1];
-                let view = &target.view;
-                commands.run("rays", starts, &[&params, &view.hits, &view.guides.materials, &list], groups);
+                let size = [run as u32, 1];
+                commands.run("rays", starts, &[&params, &target.view.pixels, &list], size);
                 let mut done = 0;
                 while done < samples {
                     let more = ((pace.pieces() / run).max(1) as u32).min(samples - done);
                     pace.run(run * more as usize, || follow.run((commands, "rays"), &list, &sums, run, [done, more]))?;
                     done += more;
                 }
-                commands.run("rays", mean, &[&params, &sums, &target.glossy], groups);
+                commands.run("rays", mean, &[&params, &sums, &target.glossy], size);
                 pixel += run;
             }
             Ok(())
         };
         baseline.frame(camera, false, Commands::by_host(gpu), fill)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(&source(), Params as "Params" { camera, seed, frame, first_pixel, pixels, samples });
     }
 }

@@ -27,9 +27,9 @@ use serde::{Deserialize, Serialize};
 /// Camera rays that a pixel's guides are the mean of, at the most.
 pub(crate) const GUIDE_SAMPLES: u32 = 8;
 /// Least albedo that light is divided by.
-const MIN_ALBEDO: f32 = 0.02;
+pub(crate) const MIN_ALBEDO: f32 = 0.02;
 /// Depth that stands for the environment, in units of nothing: farther than all.
-const FAR: f32 = 1e4;
+pub(crate) const FAR: f32 = 1e4;
 /// Most levels: holes of 4096 pixels.
 pub(crate) const MOST_LEVELS: u32 = 12;
 /// Pixels that a despeckled one is compared with.

@@ -4,18 +4,16 @@ use super::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, MOST_LEVELS, NEIGHBOUR
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::gpu::Gpu;
-use crate::gpu::camera::GpuCamera;
-use crate::gpu::kernel::{Kernel, area, groups, shader};
-use crate::gpu::scene::{GpuScene, MATERIALS, RAYS};
+use crate::gpu::camera::{CAMERA, GpuCamera};
+use crate::gpu::kernel::{Kernel, area};
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{Access, KernelSpec, StructLayout, layout};
 use crate::scene::Camera;
 use crate::view::layers::LayerImages;
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 use std::sync::Arc;
-
-/// Edges of a workgroup of camera rays, and of the filter's, pixels.
-const RAYS_GROUP: [u32; 2] = [8, 8];
-const FILTER_GROUP: [u32; 2] = [16, 4];
 
 /// `GuideParams` of guides.wgsl.
 #[repr(C)]
@@ -71,9 +69,56 @@ impl From<&GpuGuide> for Guide {
     }
 }
 
-fn guides_source() -> String {
-    [RAYS, MATERIALS, shader!("camera", "camera_ray", "view", "mirror", "guide", "guides")].concat()
+/// The guides' kernel.
+pub(crate) const ADD_GUIDES: KernelSpec = KernelSpec {
+    file: "path_trace/add_guides.wgsl",
+    twin: "src/method/path_trace/denoise.rs: guides",
+    workgroup: [8, 8],
+    scene: true,
+    bindings: &[("guide_params", Uniform), ("diffuse_guides", ReadWrite), ("glossy_guides", ReadWrite)],
+    structs: &[&GUIDE_PARAMS, &CAMERA, &GUIDE],
+};
+const GUIDE_PARAMS: StructLayout = layout!(GuideParams as "GuideParams" { camera, seed, frame, index, count, mirror_alpha });
+const GUIDE: StructLayout = layout!(GpuGuide as "Guide" { normal, depth, albedo, factor });
+const PARAMS: StructLayout = layout!(Params as "Params" {
+    width, height, step, despeckle, luminance_sigma, normal_power, depth_sigma, albedo_sigma
+});
+
+/// A kernel of the filter: it reads the layer `source` and writes `result`.
+const fn filter_kernel(file: &'static str, twin: &'static str, bindings: &'static [(&'static str, Access)]) -> KernelSpec {
+    KernelSpec { file, twin, workgroup: [16, 4], scene: false, bindings, structs: &[&PARAMS, &GUIDE] }
 }
+
+/// Divides a layer by its albedo, and finds how depth changes.
+pub(crate) const DENOISE_START: KernelSpec = filter_kernel(
+    "path_trace/denoise_start.wgsl",
+    "src/method/path_trace/denoise.rs: slopes",
+    &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite), ("slopes", ReadWrite)],
+);
+/// Cuts rare paths.
+pub(crate) const DESPECKLE: KernelSpec = filter_kernel(
+    "path_trace/despeckle.wgsl",
+    "src/method/path_trace/denoise.rs: despeckled",
+    &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite)],
+);
+/// Finds the noise.
+pub(crate) const WITH_VARIANCE: KernelSpec = filter_kernel(
+    "path_trace/with_variance.wgsl",
+    "src/method/path_trace/denoise.rs: with_variance",
+    &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite), ("slopes", Read)],
+);
+/// A level of the wavelet.
+pub(crate) const SMOOTH_LEVEL: KernelSpec = filter_kernel(
+    "path_trace/smooth_level.wgsl",
+    "src/method/path_trace/denoise.rs: smoothed",
+    &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite), ("slopes", Read)],
+);
+/// Multiplies the albedo in again.
+pub(crate) const DENOISE_END: KernelSpec = filter_kernel(
+    "path_trace/denoise_end.wgsl",
+    "src/method/path_trace/denoise.rs: filter_layer",
+    &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite)],
+);
 
 /// Guides of the diffuse and of the glossy layer, on a device.
 pub struct GpuGuides {
@@ -113,15 +158,15 @@ pub struct Denoiser {
 impl Denoiser {
     /// Compiles it.
     pub fn new(scene: Arc<GpuScene>, params: &DenoiseParams) -> Result<Self> {
-        let kernel = |entry| Kernel::new(&scene.gpu, shader!("math", "guide", "denoise"), entry);
+        let kernel = |spec| Kernel::new(&scene.gpu, spec);
         let filter = Filter {
-            start: kernel("denoise_start")?,
-            despeckle: kernel("despeckle")?,
-            variance: kernel("with_variance")?,
-            level: kernel("smooth_level")?,
-            end: kernel("denoise_end")?,
+            start: kernel(&DENOISE_START)?,
+            despeckle: kernel(&DESPECKLE)?,
+            variance: kernel(&WITH_VARIANCE)?,
+            level: kernel(&SMOOTH_LEVEL)?,
+            end: kernel(&DENOISE_END)?,
         };
-        let guides = Kernel::in_scene(&scene, &guides_source(), "add_guides", [1, 2], &[])?;
+        let guides = Kernel::in_scene(&scene, &ADD_GUIDES, &[])?;
         Ok(Self { guides, filter, params: *params, scene })
     }
 
@@ -137,9 +182,9 @@ impl Denoiser {
         for index in 0..count {
             let mirror_alpha = self.params.mirror_alpha;
             let params = GuideParams { camera: camera.into(), seed, frame, index, count, mirror_alpha, padding: [0; 3] };
-            let params = gpu.upload("the guides' parameters", bytemuck::bytes_of(&params))?;
+            let params = gpu.uniform("the guides' parameters", &params)?;
             let [diffuse, glossy] = &guides.layers;
-            gpu.dispatch(&self.guides, &[&params, diffuse, glossy], groups(camera.size, RAYS_GROUP))?;
+            gpu.dispatch(&self.guides, &[&params, diffuse, glossy], camera.size)?;
         }
         Ok(guides)
     }
@@ -166,13 +211,13 @@ impl Denoiser {
         }
         let (gpu, filter) = (&self.scene.gpu, &self.filter);
         let pixels = layer.len() as u64;
-        let plane = || gpu.output("a denoised layer", 16 * pixels);
+        let plane = || gpu.output("a denoised layer", size_of::<Vec4>() as u64 * pixels);
         let (mut from, mut to) = (plane()?, plane()?);
-        let slopes = gpu.output("slopes", 8 * pixels)?;
+        let slopes = gpu.output("slopes", size_of::<Vec2>() as u64 * pixels)?;
         let run = |kernel: &Kernel, step: i32, buffers: [&wgpu::Buffer; 2], slopes: Option<&wgpu::Buffer>| {
-            let params = gpu.upload("the denoiser's parameters", bytemuck::bytes_of(&self.kernel_params(size, step)))?;
+            let params = gpu.uniform("the denoiser's parameters", &self.kernel_params(size, step))?;
             let buffers: Vec<_> = [&params, guides].into_iter().chain(buffers).chain(slopes).collect();
-            gpu.dispatch(kernel, &buffers, groups(size, FILTER_GROUP))
+            gpu.dispatch(kernel, &buffers, size)
         };
         let layer: Vec<Vec4> = layer.iter().map(|c| c.extend(0.0)).collect();
         let layer = gpu.upload("a layer", bytemuck::cast_slice(&layer))?;
@@ -193,21 +238,5 @@ impl Denoiser {
     fn kernel_params(&self, [width, height]: [u32; 2], step: i32) -> Params {
         let DenoiseParams { luminance_sigma, normal_power, depth_sigma, albedo_sigma, despeckle, .. } = self.params;
         Params { width, height, step, despeckle, luminance_sigma, normal_power, depth_sigma, albedo_sigma }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shaders() {
-        check!(&guides_source(), GuideParams as "GuideParams" { camera, seed, frame, index, count, mirror_alpha });
-        let source = shader!("math", "guide", "denoise");
-        check!(source, GpuGuide as "Guide" { normal, depth, albedo, factor });
-        check!(source, Params as "Params" {
-            width, height, step, despeckle, luminance_sigma, normal_power, depth_sigma, albedo_sigma
-        });
     }
 }

@@ -3,11 +3,12 @@
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::base::progress::Progress;
-use crate::gpu::camera::GpuCamera;
-use crate::gpu::follow::{Place, Purpose, SampleSum, Samples, WORKGROUP, most_starts};
-use crate::gpu::kernel::{Kernel, shader};
+use crate::gpu::camera::{CAMERA, GpuCamera};
+use crate::gpu::follow::{PATH_START, Place, Purpose, SampleSum, Samples, most_starts};
+use crate::gpu::kernel::Kernel;
 use crate::gpu::pace::Pace;
-use crate::gpu::scene::{GpuScene, MATERIALS, PATHS, RAYS};
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::{Access, KernelSpec, StructLayout, layout};
 use crate::material::bsdf::{Lobes, Query};
 use crate::scene::Camera;
 use crate::transport::follow::PathStart;
@@ -41,10 +42,27 @@ struct AddParams {
     samples: u32,
 }
 
-/// What the camera's rays take.
-fn source() -> String {
-    [RAYS, MATERIALS, PATHS, shader!("start", "camera", "camera_ray", "camera_hits")].concat()
-}
+/// The camera's rays.
+pub(crate) const CAMERA_HITS: KernelSpec = KernelSpec {
+    file: "path_trace/camera_hits.wgsl",
+    twin: "src/transport/path.rs: trace_layers",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[("params", Access::Uniform), ("starts", Access::ReadWrite), ("emission", Access::ReadWrite)],
+    structs: &[&HIT_PARAMS, &CAMERA, &PATH_START],
+};
+/// The sums over a pixel's samples.
+pub(crate) const ADD_SAMPLES: KernelSpec = KernelSpec {
+    file: "path_trace/add_samples.wgsl",
+    twin: "src/method/path_trace/mod.rs: image",
+    workgroup: [64, 1],
+    scene: false,
+    bindings: &[("params", Access::Uniform), ("values", Access::ReadWrite), ("frame", Access::ReadWrite)],
+    structs: &[&ADD_PARAMS],
+};
+const HIT_PARAMS: StructLayout =
+    layout!(HitParams as "Params" { camera, seed, frame, first_pixel, pixels, first_sample, samples });
+const ADD_PARAMS: StructLayout = layout!(AddParams as "Params" { quantities, quantity, first_pixel, pixels, samples });
 
 /// A path tracer on a device.
 pub struct PathTracer {
@@ -58,8 +76,8 @@ pub struct PathTracer {
 impl PathTracer {
     /// Compiles it, for the layers or for the full image alone.
     pub fn new(scene: Arc<GpuScene>, path: &PathParams, layers: bool) -> Result<Self> {
-        let hits = Kernel::in_scene(&scene, &source(), "camera_hits", [1, 2], &[])?;
-        let add = Kernel::new(&scene.gpu, shader!("add_samples"), "add_samples")?;
+        let hits = Kernel::in_scene(&scene, &CAMERA_HITS, &[])?;
+        let add = Kernel::new(&scene.gpu, &ADD_SAMPLES)?;
         // After the set that the camera ray has drawn.
         let place = Place { branch: None, first_set: 1 };
         let whole = Samples::new(scene.clone(), path, Purpose::Scattering(Query::default()), place)?;
@@ -128,8 +146,8 @@ impl PathTracer {
         let count = (params.pixels * params.samples) as usize;
         let starts = gpu.output("starts of paths", (count * size_of::<PathStart>()) as u64)?;
         let values = gpu.output("samples", (count * size_of::<SampleSum>()) as u64)?;
-        let uniform = gpu.upload("the camera", bytemuck::bytes_of(params))?;
-        gpu.dispatch(&self.hits, &[&uniform, &starts, &values], [count.div_ceil(WORKGROUP) as u32, 1])?;
+        let uniform = gpu.uniform("the camera", params)?;
+        gpu.dispatch(&self.hits, &[&uniform, &starts, &values], [count as u32, 1])?;
         for quantity in 0..=self.paths.len() {
             if let Some(paths) = quantity.checked_sub(1).map(|k| &self.paths[k]) {
                 paths.dispatch(&starts, &values, count, [0, 1])?;
@@ -141,23 +159,9 @@ impl PathTracer {
                 pixels: params.pixels,
                 samples: params.samples,
             };
-            let add = gpu.upload("the sums' parameters", bytemuck::bytes_of(&add))?;
-            let groups = [(params.pixels as usize).div_ceil(WORKGROUP) as u32, 1];
-            gpu.dispatch(&self.add, &[&add, &values, frame], groups)?;
+            let add = gpu.uniform("the sums' parameters", &add)?;
+            gpu.dispatch(&self.add, &[&add, &values, frame], [params.pixels, 1])?;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shaders() {
-        check!(&source(), HitParams as "Params" { camera, seed, frame, first_pixel, pixels, first_sample, samples });
-        let add = shader!("add_samples");
-        check!(add, AddParams as "Params" { quantities, quantity, first_pixel, pixels, samples });
     }
 }

@@ -5,12 +5,14 @@ use crate::Result;
 use crate::base::clock::Clock;
 use crate::gpu::Gpu;
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, area, groups, shader};
-use crate::gpu::resident::{Place, Resident, room_for_probes};
-use crate::gpu::scene::{GpuScene, RAYS};
-use crate::gpu::view::View;
+use crate::gpu::kernel::{Kernel, area};
+use crate::gpu::resident::{PLACE, Place, Resident, room_for_probes};
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::composite::{Composite, Layers};
 use crate::gpu::view::gbuffer::GBuffer;
+use crate::gpu::view::{PIXEL, REFLECTED, View};
 use crate::lightmap::LightMap;
 use crate::probe::file::{Probe, Texel};
 use crate::probe::store::ProbeStore;
@@ -19,14 +21,13 @@ use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::layers::LayerImages;
 use bytemuck::{Pod, Zeroable};
+use glam::Vec4;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
-/// Edges of a workgroup, pixels.
-const WORKGROUP: [u32; 2] = [8, 8];
-/// Bytes of a sample that a pixel keeps, and of how many these are.
-const SAMPLE: u64 = 16;
-const COUNTS: u64 = 8;
+/// A sample that a pixel keeps, and how many these are.
+type Sample = [f32; 4];
+type Counts = [u32; 2];
 
 /// `UlrParams` of ulr.wgsl.
 #[repr(C)]
@@ -43,22 +44,49 @@ struct Params {
     padding: [u32; 2],
 }
 
-fn source() -> String {
-    [RAYS, shader!("view", "probe", "ulr")].concat()
-}
+/// Asks one probe at every pixel.
+pub(crate) const ULR_LOOK: KernelSpec = KernelSpec {
+    file: "ulr/ulr_look.wgsl",
+    twin: "src/method/ulr/mod.rs: look",
+    workgroup: [8, 8],
+    scene: true,
+    bindings: &[
+        ("ulr_params", Uniform),
+        ("probe_params", Uniform),
+        ("view", Read),
+        ("probe_words", Read),
+        ("kept", ReadWrite),
+        ("counts", ReadWrite),
+    ],
+    structs: &[&PARAMS, &PLACE, &PIXEL, &REFLECTED],
+};
+/// Weighs what the pixels keep.
+pub(crate) const ULR_BLEND: KernelSpec = KernelSpec {
+    file: "ulr/ulr_blend.wgsl",
+    twin: "src/method/ulr/mod.rs: weights",
+    workgroup: [8, 8],
+    scene: false,
+    bindings: &[
+        ("ulr_params", Uniform),
+        ("view", Read),
+        ("kept", Read),
+        ("counts", Read),
+        ("glossy", ReadWrite),
+        ("unserved", ReadWrite),
+    ],
+    structs: &[&PARAMS, &PIXEL, &REFLECTED],
+};
+const PARAMS: StructLayout = layout!(Params as "UlrParams" {
+    eye, width, height, blend, angle, resolution, hidden, plane_tolerance
+});
 
-/// A probe as its file has it.
-struct GpuProbe {
-    forward: wgpu::Buffer,
-    texels: wgpu::Buffer,
-}
+/// A probe as its file has it: its texels, then the vertices of its map.
+struct GpuProbe(wgpu::Buffer);
 
 impl GpuProbe {
     fn upload(gpu: &Gpu, probe: &Probe) -> Result<Self> {
-        Ok(Self {
-            forward: gpu.upload("a probe's map", bytemuck::cast_slice(&probe.map.forward))?,
-            texels: gpu.upload("a probe's texels", bytemuck::cast_slice(&probe.texels))?,
-        })
+        let lists: [&[u8]; 2] = [bytemuck::cast_slice(&probe.texels), bytemuck::cast_slice(&probe.map.forward)];
+        Ok(Self(gpu.upload("a probe", &lists.concat())?))
     }
 
     fn bytes(probe: &Probe) -> u64 {
@@ -107,8 +135,8 @@ impl Ulr {
         let flat = CurvatureMap::flat(world.scene.geometry.positions.len());
         Ok(Self {
             gbuffer: GBuffer::new(&scene, world, &flat)?,
-            look: Kernel::in_scene(&scene, &source(), "ulr_look", [7, 2], &[])?,
-            blend: Kernel::new(&gpu, &source(), "ulr_blend")?,
+            look: Kernel::in_scene(&scene, &ULR_LOOK, &[])?,
+            blend: Kernel::new(&gpu, &ULR_BLEND)?,
             composite: Composite::new(&gpu, params.supersample)?,
             resident: Resident::new(0),
             target: None,
@@ -146,16 +174,17 @@ impl Ulr {
         if let Some(target) = self.target.take().filter(|t| t.view.size == fine) {
             return Ok(target);
         }
-        let kept = SAMPLE * u64::from(self.params.blend);
-        let a_sub_pixel = View::BYTES + kept + COUNTS + 16;
+        let kept = size_of::<Sample>() as u64 * u64::from(self.params.blend);
+        let (counts, glossy) = (size_of::<Counts>() as u64, size_of::<Vec4>() as u64);
+        let a_sub_pixel = View::BYTES + kept + counts + glossy;
         let frame = area(fine) * a_sub_pixel + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
         self.resident.set_budget(room_for_probes(self.memory, size, frame, area(probe) * size_of::<Texel>() as u64)?);
         let gpu = &self.gpu;
         Ok(Target {
             view: View::new(gpu, fine)?,
             kept: gpu.output("the samples that pixels blend", area(fine) * kept)?,
-            counts: gpu.output("their numbers", area(fine) * COUNTS)?,
-            glossy: gpu.output("blended colours", area(fine) * 16)?,
+            counts: gpu.output("their numbers", area(fine) * counts)?,
+            glossy: gpu.output("blended colours", area(fine) * glossy)?,
             layers: Layers::new(gpu, area(size))?,
         })
     }
@@ -171,29 +200,26 @@ impl Ulr {
     fn passes(&mut self, t: &Target, camera: &Camera, probes: &mut ProbeStore<impl DeserializeOwned>) -> Result<UlrFrame> {
         let (gpu, view, eye) = (&*self.gpu, &t.view, camera.position());
         let fine = Camera { size: view.size, ..camera.clone() };
-        let groups = groups(view.size, WORKGROUP);
         let mut clock = Clock::start();
         let mut commands = Commands::new(gpu);
 
         self.gbuffer.run(&self.scene, &mut commands, &fine, view, None)?;
         gpu.clear(&t.counts);
         gpu.clear(&t.layers.unserved);
-        let params = gpu.upload("the parameters of ulr", bytemuck::bytes_of(&self.kernel_params(eye.to_array(), view.size)))?;
+        let params = gpu.uniform("the parameters of ulr", &self.kernel_params(eye.to_array(), view.size))?;
         let is_baked = |i: usize| !probes.set.files[i].is_empty();
-        let materials = &view.guides.materials;
         for index in nearest(&probes.set.grid, eye, self.params.probes as usize, is_baked) {
             clock.restart();
             let probe = probes.probe(index)?;
             let there = self.resident.get(gpu, index, GpuProbe::bytes(&probe), || GpuProbe::upload(gpu, &probe))?;
             clock.lap("load");
-            let place = gpu.upload("a probe's place", bytemuck::bytes_of(&Place::new(index, &probe, 1.0)))?;
-            let GpuProbe { forward, texels } = &*there;
-            let buffers = [&params, &place, forward, texels, &view.hits, &view.positions, materials, &t.kept, &t.counts];
-            commands.run("gather", &self.look, &buffers, groups);
+            let words = size_of_val(probe.texels.as_slice()) / size_of::<u32>();
+            let place = gpu.uniform("a probe's place", &Place::new(index, &probe, 1.0, words))?;
+            commands.run("gather", &self.look, &[&params, &place, &view.pixels, &there.0, &t.kept, &t.counts], view.size);
         }
-        let buffers = [&params, materials, &t.kept, &t.counts, &t.glossy, &t.layers.unserved];
-        commands.run("gather", &self.blend, &buffers, groups);
-        self.composite.layers(gpu, &mut commands, (view, &fine), (&t.glossy, None), &t.layers)?;
+        let buffers = [&params, &view.pixels, &t.kept, &t.counts, &t.glossy, &t.layers.unserved];
+        commands.run("gather", &self.blend, &buffers, view.size);
+        self.composite.layers(gpu, &mut commands, view, (&t.glossy, None), &t.layers)?;
         let passes = commands.finish()?;
 
         clock.restart();
@@ -212,14 +238,11 @@ impl Ulr {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::layout::check;
     use std::mem::offset_of;
 
+    /// The seven words that ulr_look.wgsl reads.
     #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(&source(), Params as "UlrParams" {
-            eye, width, height, blend, angle, resolution, hidden, plane_tolerance
-        });
+    fn a_texel_lies_as_the_shader_reads_it() {
         assert_eq!(size_of::<Texel>(), 7 * 4);
         assert_eq!(
             [offset_of!(Texel, glossy), offset_of!(Texel, barycentric), offset_of!(Texel, triangle)],

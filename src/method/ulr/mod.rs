@@ -35,10 +35,10 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Least angle between two rays, radians: keeps the weight of a probe at the eye finite.
-const MIN_PENALTY: f32 = 1e-3;
+pub(crate) const MIN_PENALTY: f32 = 1e-3;
 /// How far a texel that sees the same surface may lie from the point, as a fraction of the probe's distance: a slanted surface spreads
 /// a texel far.
-const MAX_SPREAD: f32 = 0.2;
+pub(crate) const MAX_SPREAD: f32 = 0.2;
 
 /// Most probes that a pixel blends.
 const MOST_BLENDED: u32 = 64;

@@ -42,7 +42,7 @@ const MAX_COMPRESSED_LEAF: u32 = 3;
 
 /// Hits of one object in one interval of this length along a ray share their hash, times (1 + largest coordinate of its origin).
 /// Sixteen times Mitsuba's step off a surface, so that few sheets thinner than that step straddle two intervals.
-const SHEET: f32 = 16.0 * 1500.0 * 0.5 * f32::EPSILON;
+pub(crate) const SHEET: f32 = 16.0 * 1500.0 * 0.5 * f32::EPSILON;
 
 /// Acceleration structure over the triangles of a scene (all, or the opaque ones only).
 pub struct Bvh {

@@ -5,9 +5,8 @@ use crate::Result;
 use crate::base::math::Frame;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node, Value};
-use crate::scene::Round;
-use crate::scene::primitives;
 use crate::scene::round::RoundKind;
+use crate::scene::{Round, primitives};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
 use std::collections::BTreeMap;
 

@@ -27,15 +27,15 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Cells of the table along each axis. *Paper*: 32.
-const BINS: usize = 32;
+pub(crate) const BINS: usize = 32;
 /// Largest alpha of the table. *Paper*: 0.5.
-const MAX_ALPHA: f32 = 0.5;
+pub(crate) const MAX_ALPHA: f32 = 0.5;
 /// Nearest and farthest distance of the table, m. *Paper*: 0.01 to 10.
-const DISTANCES: [f32; 2] = [0.01, 10.0];
+pub(crate) const DISTANCES: [f32; 2] = [0.01, 10.0];
 /// Smallest cosine of incidence that is told from grazing.
-const MIN_COS: f32 = 0.02;
+pub(crate) const MIN_SLANT: f32 = 0.02;
 /// |det G| against the plane's below which a concave reflector counts as a plane.
-const MIN_FOCUS: f32 = 0.25;
+pub(crate) const MIN_FOCUS: f32 = 0.25;
 
 /// How a Gaussian is made of the footprint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -206,8 +206,8 @@ impl Footprint {
         let frame = Frame::from_normal_and_tangent(point.n, point.curvature.d1);
         let to_eye = camera.position() - point.x;
         let mut e = frame.to_local(to_eye.try_normalize().unwrap_or(point.n));
-        if e.z < MIN_COS {
-            e = Vec3::new(e.x, e.y, MIN_COS).normalize_or(Vec3::Z);
+        if e.z < MIN_SLANT {
+            e = Vec3::new(e.x, e.y, MIN_SLANT).normalize_or(Vec3::Z);
         }
         let c = 1.0 / to_eye.length().max(DISTANCES[0]) + 1.0 / point.reflected_distance.max(DISTANCES[0]);
         let plane = path_hessian(e, c, Vec2::ZERO);

@@ -1,19 +1,18 @@
 //! Rays along edges: the twin of [`crate::method::glossy_probes::coverage`].
 
 use crate::Result;
-use crate::gpu::camera::GpuCamera;
+use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, groups, shader};
-use crate::gpu::scene::{GpuScene, MATERIALS, PATHS, RAYS};
-use crate::gpu::view::View;
-use crate::gpu::view::composite::Layers;
+use crate::gpu::kernel::Kernel;
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
+use crate::gpu::view::composite::{LAYER_PIXEL, Layers};
+use crate::gpu::view::{PIXEL, REFLECTED, View};
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
 
-/// Edges of a workgroup, pixels.
-const WORKGROUP: [u32; 2] = [8, 8];
-
-/// `CoverageParams` of coverage.wgsl.
+/// `CoverageParams` of cover.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Params {
@@ -24,11 +23,18 @@ struct Params {
     padding: u32,
 }
 
-fn source() -> String {
-    [RAYS, MATERIALS, PATHS, shader!("camera", "camera_ray", "view", "mirror", "gbuffer", "coverage")].concat()
-}
-
 /// The kernel.
+pub(crate) const COVER: KernelSpec = KernelSpec {
+    file: "glossy_probes/cover.wgsl",
+    twin: "src/method/glossy_probes/coverage.rs: covered_pixels",
+    workgroup: [8, 8],
+    scene: true,
+    bindings: &[("coverage_params", Uniform), ("view", Read), ("view_glossy", Read), ("frame", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &LAYER_PIXEL],
+};
+const PARAMS: StructLayout = layout!(Params as "CoverageParams" { camera, sub_pixels, rays, mirrors });
+
+/// The kernel, compiled.
 pub(crate) struct Coverage {
     kernel: Kernel,
     rays: u32,
@@ -37,7 +43,7 @@ pub(crate) struct Coverage {
 impl Coverage {
     /// For N x N rays a pixel.
     pub(crate) fn new(scene: &GpuScene, rays: u32) -> Result<Self> {
-        Ok(Self { kernel: Kernel::in_scene(scene, &source(), "cover", [6, 3], &[])?, rays })
+        Ok(Self { kernel: Kernel::in_scene(scene, &COVER, &[])?, rays })
     }
 
     /// Renders the pixels along edges anew. `camera` is of the frame's size; `mirrors` says that `glossy` lacks what perfect mirrors show.
@@ -56,22 +62,8 @@ impl Coverage {
             mirrors: mirrors.into(),
             padding: 0,
         };
-        let params = scene.gpu.upload("the coverage's parameters", bytemuck::bytes_of(&params))?;
-        let [emission, diffuse, out] = &layers.planes;
-        let (positions, normals) = (&view.positions, &view.guides.normals);
-        let buffers = [&params, &view.hits, positions, normals, &view.reflected, glossy, emission, diffuse, out];
-        commands.run("coverage", &self.kernel, &buffers, groups(camera.size, WORKGROUP));
+        let params = scene.gpu.uniform("the coverage's parameters", &params)?;
+        commands.run("coverage", &self.kernel, &[&params, &view.pixels, glossy, &layers.frame], camera.size);
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        check!(&source(), Params as "CoverageParams" { camera, sub_pixels, rays, mirrors });
     }
 }

@@ -1,14 +1,22 @@
 //! The filter's footprint (§6.1): the twin of [`crate::method::glossy_probes::footprint`].
 
 use crate::gpu::Gpu;
-use crate::gpu::camera::GpuCamera;
+use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, WORKGROUP, groups, shader};
-use crate::gpu::view::View;
+use crate::gpu::kernel::Kernel;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
+use crate::gpu::view::{PIXEL, REFLECTED, SHADING, View};
 use crate::method::glossy_probes::footprint;
 use crate::method::glossy_probes::footprint::Foreshortening;
 use crate::{Result, scene};
 use bytemuck::{Pod, Zeroable};
+
+/// Kinds of foreshortening, as the shader numbers them.
+pub(crate) const NONE: u32 = 0;
+pub(crate) const PAPER: u32 = 1;
+pub(crate) const DERIVED: u32 = 2;
+pub(crate) const CURVED: u32 = 3;
 
 /// What the shader's `Params` holds.
 #[repr(C)]
@@ -21,6 +29,17 @@ struct Params {
     padding: u32,
 }
 
+/// The kernel.
+pub(crate) const FOOTPRINT: KernelSpec = KernelSpec {
+    file: "glossy_probes/footprint.wgsl",
+    twin: "src/method/glossy_probes/footprint/mod.rs: covariance",
+    workgroup: [16, 4],
+    scene: false,
+    bindings: &[("footprint_params", Uniform), ("table", Read), ("view", Read), ("shading", Read), ("covariances", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &SHADING],
+};
+const PARAMS: StructLayout = layout!(Params as "Params" { camera, roughness_scale, small_d_r, foreshortening });
+
 /// The kernel with its table.
 pub(crate) struct Footprint {
     kernel: Kernel,
@@ -31,7 +50,7 @@ pub(crate) struct Footprint {
 impl Footprint {
     pub(crate) fn new(gpu: &Gpu, footprint: &footprint::Footprint) -> Result<Self> {
         Ok(Self {
-            kernel: Kernel::new(gpu, shader!("math", "camera", "perturb", "view", "footprint"), "footprint")?,
+            kernel: Kernel::new(gpu, &FOOTPRINT)?,
             table: gpu.upload("the footprint's table", bytemuck::cast_slice(&footprint.table))?,
             params: footprint.params,
         })
@@ -51,37 +70,16 @@ impl Footprint {
             roughness_scale: self.params.roughness_scale,
             small_d_r: self.params.small_d_r,
             foreshortening: match self.params.foreshortening {
-                Foreshortening::None => 0,
-                Foreshortening::Paper => 1,
-                Foreshortening::Derived => 2,
-                Foreshortening::Curved => 3,
+                Foreshortening::None => NONE,
+                Foreshortening::Paper => PAPER,
+                Foreshortening::Derived => DERIVED,
+                Foreshortening::Curved => CURVED,
             },
             padding: 0,
         };
-        let params = gpu.upload("the footprint's parameters", bytemuck::bytes_of(&params))?;
-        let buffers = [
-            &params,
-            &self.table,
-            &view.positions,
-            &view.guides.normals,
-            &view.curvatures,
-            &view.guides.materials,
-            &view.reflected,
-            covariances,
-        ];
-        commands.run("footprint", &self.kernel, &buffers, groups(view.size, WORKGROUP));
+        let params = gpu.uniform("the footprint's parameters", &params)?;
+        let buffers = [&params, &self.table, &view.pixels, &view.shading, covariances];
+        commands.run("footprint", &self.kernel, &buffers, view.size);
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        let source = shader!("math", "camera", "perturb", "view", "footprint");
-        check!(source, Params as "Params" { camera, roughness_scale, small_d_r, foreshortening });
     }
 }

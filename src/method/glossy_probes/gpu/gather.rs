@@ -3,22 +3,30 @@
 use super::probes::GpuProbe;
 use crate::gpu::Gpu;
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, area, shader};
-use crate::gpu::resident::Place;
-use crate::gpu::view::View;
+use crate::gpu::kernel::{Kernel, area};
+use crate::gpu::resident::{PLACE, Place};
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
+use crate::gpu::view::{PIXEL, REFLECTED, SHADING, View};
+use crate::method::glossy_probes::candidates::{Directions, Light, Seen};
 use crate::method::glossy_probes::gather::{BilinearRule, GatherParams};
 use crate::method::glossy_probes::perturb::{Order, PerturbParams};
 use crate::method::glossy_probes::search::{MAX_RADIUS, TILE};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use std::mem::offset_of;
 
 /// Most levels of a search.
 const LEVELS: usize = 8;
-/// Edge of a workgroup.
-const WORKGROUP: u32 = 8;
-/// Bytes of what the search leaves for an anchor.
-const ANCHOR: u64 = 32;
+/// Orders of the perturbation, as the shader numbers them.
+pub(crate) const PLANE: u32 = 0;
+pub(crate) const FIRST: u32 = 1;
+pub(crate) const SECOND: u32 = 2;
+/// Rules of the fetch, likewise.
+pub(crate) const NEAREST: u32 = 0;
+pub(crate) const SAME_REFLECTOR: u32 = 1;
+const SAME_REFLECTOR_AND_REFLECTED: u32 = 2;
 
 /// What the shader's `PerturbParams` holds.
 #[repr(C)]
@@ -29,17 +37,18 @@ struct Perturb {
     second_order_limit: f32,
     min_focus: f32,
     newton: u32,
+    padding: [u32; 3],
 }
 
 impl Perturb {
     fn new(params: &PerturbParams) -> Self {
         let order = match params.order {
-            Order::Plane => 0,
-            Order::First => 1,
-            Order::Second => 2,
+            Order::Plane => PLANE,
+            Order::First => FIRST,
+            Order::Second => SECOND,
         };
         let PerturbParams { second_order_limit, min_focus, newton, .. } = *params;
-        Self { order, exact_plane: params.exact_plane.into(), second_order_limit, min_focus, newton }
+        Self { order, exact_plane: params.exact_plane.into(), second_order_limit, min_focus, newton, padding: [0; 3] }
     }
 }
 
@@ -58,15 +67,88 @@ struct Params {
     falloff: f32,
     albedo_ratio: u32,
     roughness_penalty: f32,
-    padding: [u32; 3],
-    search: [[f32; 2]; LEVELS],
+    search: [[f32; 4]; LEVELS],
 }
+
+/// `Anchor` of search.wgsl: what the search leaves for an anchor.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Anchor {
+    texel: [f32; 2],
+    end: [f32; 2],
+    energy: f32,
+    padding: [u32; 3],
+}
+
+/// `Gathered` of gathered.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(crate) struct GpuGathered {
+    color: [f32; 3],
+    pub(crate) weight: f32,
+    pub(crate) texel: [f32; 2],
+    energy: f32,
+    pub(crate) probe: u32,
+}
+
+/// The search of anchors.
+pub(crate) const FIND_ANCHORS: KernelSpec = KernelSpec {
+    file: "glossy_probes/find_anchors.wgsl",
+    twin: "src/method/glossy_probes/gather.rs: best_samples",
+    workgroup: [8, 8],
+    scene: false,
+    bindings: &[
+        ("gather_params", Uniform),
+        ("probe_params", Uniform),
+        ("view", Read),
+        ("shading", Read),
+        ("map", Read),
+        ("seen", Read),
+        ("directions", Read),
+        ("anchors", ReadWrite),
+    ],
+    structs: &[&PARAMS, &PERTURB, &PLACE, &PIXEL, &REFLECTED, &SHADING, &SEEN, &DIRECTIONS, &ANCHOR],
+};
+/// The gather.
+pub(crate) const GATHER: KernelSpec = KernelSpec {
+    file: "glossy_probes/gather.wgsl",
+    twin: "src/method/glossy_probes/gather.rs: gather",
+    workgroup: [8, 8],
+    scene: false,
+    bindings: &[
+        ("gather_params", Uniform),
+        ("probe_params", Uniform),
+        ("view", Read),
+        ("shading", Read),
+        ("map", Read),
+        ("seen", Read),
+        ("directions", Read),
+        ("anchors", Read),
+        ("light", Read),
+        ("sums", ReadWrite),
+    ],
+    structs: &[&PARAMS, &PERTURB, &PLACE, &PIXEL, &REFLECTED, &SHADING, &SEEN, &DIRECTIONS, &ANCHOR, &LIGHT, &GATHERED],
+};
+const PERTURB: StructLayout = layout!(Perturb as "PerturbParams" { order, exact_plane, second_order_limit, min_focus, newton });
+const PARAMS: StructLayout = layout!(Params as "Params" {
+    eye, width, perturb, height, anchors, levels, bilinear, material_penalty, falloff, albedo_ratio, roughness_penalty, search
+});
+/// Two halves of a word are one member to the shader.
+const SEEN: StructLayout = StructLayout {
+    name: "Seen",
+    size: size_of::<Seen>(),
+    fields: &[("reflected_point", offset_of!(Seen, reflected_point)), ("materials", offset_of!(Seen, reflected_material))],
+};
+const DIRECTIONS: StructLayout = layout!(Directions as "Directions" { normal, reflected, alpha });
+const LIGHT: StructLayout = layout!(Light as "Light" { glossy, object, albedo, reflected_material });
+const ANCHOR: StructLayout = layout!(Anchor as "Anchor" { texel, end, energy });
+pub(crate) const GATHERED: StructLayout = layout!(GpuGathered as "Gathered" { color, weight, texel, energy, probe });
 
 impl Params {
     fn new(params: &GatherParams, eye: Vec3, size: [u32; 2]) -> Self {
-        let mut search = [[0.0; 2]; LEVELS];
+        let mut search = [[0.0; 4]; LEVELS];
         for (level, to) in params.search.iter().zip(&mut search) {
-            *to = [level.radius.min(MAX_RADIUS) as f32, level.step];
+            *to = [level.radius.min(MAX_RADIUS) as f32, level.step, 0.0, 0.0];
         }
         Self {
             eye: eye.to_array(),
@@ -76,13 +158,12 @@ impl Params {
             anchors: anchor_step(params),
             levels: params.search.len() as u32,
             bilinear: match params.bilinear {
-                BilinearRule::Nearest => 0,
-                BilinearRule::SameReflector => 1,
-                BilinearRule::SameReflectorAndReflected => 2,
+                BilinearRule::Nearest => NEAREST,
+                BilinearRule::SameReflector => SAME_REFLECTOR,
+                BilinearRule::SameReflectorAndReflected => SAME_REFLECTOR_AND_REFLECTED,
             },
             material_penalty: params.material_penalty,
             roughness_penalty: params.roughness_penalty,
-            padding: [0; 3],
             falloff: params.falloff,
             albedo_ratio: params.albedo_ratio.into(),
             search,
@@ -97,20 +178,20 @@ fn anchor_step(params: &GatherParams) -> u32 {
 
 /// What the gather leaves of a frame.
 pub(crate) struct Sums {
-    /// Colour times weight, and the weight; 0 where no probe had a sample.
+    /// A [`GpuGathered`] a pixel.
     pub(crate) sums: wgpu::Buffer,
-    /// Energy and texel (as bits) of the best sample, and its probe.
-    pub(crate) best: wgpu::Buffer,
     anchors: wgpu::Buffer,
 }
 
 impl Sums {
+    /// Bytes a pixel, but for the anchors.
+    pub(crate) const BYTES: u64 = size_of::<GpuGathered>() as u64;
+
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], params: &GatherParams) -> Result<Self> {
-        let pixels = area(size);
+        let anchors = if anchor_step(params) > 1 { area(anchor_grid(size, params)) } else { 1 };
         Ok(Self {
-            sums: gpu.output("gathered sums", 16 * pixels)?,
-            best: gpu.output("best samples", 16 * pixels)?,
-            anchors: gpu.output("anchors", ANCHOR * if anchor_step(params) > 1 { area(anchor_grid(size, params)) } else { 1 })?,
+            sums: gpu.output("gathered sums", Self::BYTES * area(size))?,
+            anchors: gpu.output("anchors", size_of::<Anchor>() as u64 * anchors)?,
         })
     }
 }
@@ -136,12 +217,7 @@ impl Gather {
                 "gather.search: {levels} levels, but the GPU takes 1 to {LEVELS}; use --device cpu"
             )));
         }
-        let source = shader!("math", "perturb", "view", "probe", "gather");
-        Ok(Self {
-            params: params.clone(),
-            find_anchors: Kernel::new(gpu, source, "find_anchors")?,
-            gather: Kernel::new(gpu, source, "gather")?,
-        })
+        Ok(Self { params: params.clone(), find_anchors: Kernel::new(gpu, &FIND_ANCHORS)?, gather: Kernel::new(gpu, &GATHER)? })
     }
 
     /// Adds what one probe has for a view, as `eye` sees it.
@@ -153,47 +229,24 @@ impl Gather {
         (probe, place): (&GpuProbe, &Place),
         out: &Sums,
     ) -> Result<()> {
-        let params = gpu.upload("the gather's parameters", bytemuck::bytes_of(&Params::new(&self.params, eye, view.size)))?;
-        let place = gpu.upload("a probe's place", bytemuck::bytes_of(place))?;
+        let params = gpu.uniform("the gather's parameters", &Params::new(&self.params, eye, view.size))?;
+        let place = gpu.uniform("a probe's place", place)?;
         let buffers = [
             &params,
             &place,
-            &probe.forward,
-            &view.positions,
-            &view.guides.normals,
-            &view.curvatures,
-            &view.guides.materials,
-            &view.reflected,
-            &probe.derivative,
+            &view.pixels,
+            &view.shading,
+            &probe.map,
             &probe.seen,
             &probe.directions,
             &out.anchors,
             &probe.light,
-            &view.albedos,
             &out.sums,
-            &out.best,
         ];
         if anchor_step(&self.params) > 1 {
-            let groups = anchor_grid(view.size, &self.params).map(|n| n.div_ceil(WORKGROUP));
-            commands.run("gather", &self.find_anchors, &buffers[..12], groups);
+            commands.run("gather", &self.find_anchors, &buffers[..8], anchor_grid(view.size, &self.params));
         }
-        commands.run("gather", &self.gather, &buffers, view.size.map(|n| n.div_ceil(WORKGROUP)));
+        commands.run("gather", &self.gather, &buffers, view.size);
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::layout::check;
-
-    #[test]
-    fn structs_are_laid_out_as_in_the_shader() {
-        let source = shader!("math", "perturb", "view", "probe", "gather");
-        check!(source, Perturb as "PerturbParams" { order, exact_plane, second_order_limit, min_focus, newton });
-        check!(source, Params as "Params" {
-            eye, width, perturb, height, anchors, levels, bilinear, material_penalty, falloff, albedo_ratio,
-            roughness_penalty, search
-        });
     }
 }

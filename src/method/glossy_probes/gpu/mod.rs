@@ -3,6 +3,7 @@
 //! Probes are gathered from one after the other, so that a frame is right with memory for a single one.
 
 pub(crate) mod coverage;
+pub(crate) mod fill;
 pub mod filter;
 pub(crate) mod footprint;
 pub(crate) mod gather;
@@ -24,7 +25,7 @@ use crate::gpu::view::composite::{Composite, Layers};
 use crate::gpu::view::gbuffer::GBuffer;
 use crate::gpu::view::mirror::Mirror;
 use crate::gpu::view::mirror_light::MirrorLight;
-use crate::gpu::view::{Guides, View};
+use crate::gpu::view::{GpuPixel, View, pixels};
 use crate::lightmap::LightMap;
 use crate::probe::file::Probe;
 use crate::probe::store::ProbeStore;
@@ -33,18 +34,22 @@ use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::mirror_light::PERFECT;
 use coverage::Coverage;
+use fill::Fill;
 use filter::{Filter, Planes, Scratch};
 use footprint::Footprint;
-use gather::{Gather, Sums};
+use gather::{Gather, GpuGathered, Sums};
 use glam::{Vec2, Vec4, Vec4Swizzles};
 use probes::GpuProbe;
 use std::sync::Arc;
 
+/// Bytes a sub-pixel of a plane of colours.
+const PLANE: u64 = size_of::<Vec4>() as u64;
+
 /// The buffers of frames of one size.
 struct Target {
     view: View,
-    /// The view of the frame before, and its camera.
-    last: Guides,
+    /// The pixels of the frame before, and its camera.
+    last: wgpu::Buffer,
     last_camera: Option<Camera>,
     sums: Sums,
     /// Colour and energy before the filter.
@@ -60,21 +65,22 @@ struct Target {
 
 impl Target {
     /// Bytes a sub-pixel, but for the layers and the anchors.
-    const BYTES: u64 = View::BYTES + 20 + 9 * 16;
+    const BYTES: u64 = View::BYTES + size_of::<GpuPixel>() as u64 + Sums::BYTES + Scratch::BYTES + 4 * PLANE;
 
     fn new(gpu: &Gpu, size: [u32; 2], params: &GlossyProbeParams) -> Result<Self> {
-        let pixels = area(size);
+        let area = area(size);
+        let plane = |label| gpu.output(label, PLANE * area);
         Ok(Self {
             view: View::new(gpu, size)?,
-            last: Guides::new(gpu, pixels)?,
+            last: pixels(gpu, size)?,
             last_camera: None,
             sums: Sums::new(gpu, size, &params.gather)?,
-            gathered: gpu.output("gathered colours", 16 * pixels)?,
-            covariances: gpu.output("covariances", 16 * pixels)?,
-            scratch: Scratch::new(gpu, pixels)?,
-            mirrored: gpu.output("what mirrors show", 16 * pixels)?,
-            glossy: gpu.output("filtered colours", 16 * pixels)?,
-            layers: Layers::new(gpu, pixels / u64::from(params.supersample * params.supersample))?,
+            gathered: plane("gathered colours")?,
+            covariances: plane("covariances")?,
+            scratch: Scratch::new(gpu, area)?,
+            mirrored: plane("what mirrors show")?,
+            glossy: plane("filtered colours")?,
+            layers: Layers::new(gpu, area / u64::from(params.supersample * params.supersample))?,
         })
     }
 }
@@ -96,6 +102,7 @@ pub struct Renderer<'a> {
     gather: Gather,
     footprint: Option<Footprint>,
     filter: Filter,
+    fill: Fill,
     composite: Composite,
     coverage: Option<Coverage>,
     resident: Resident<GpuProbe>,
@@ -134,6 +141,7 @@ impl<'a> Renderer<'a> {
             gather: Gather::new(&gpu, &params.gather)?,
             footprint: footprint.transpose()?,
             filter: Filter::new(gpu.clone(), &params.filter)?,
+            fill: Fill::new(&gpu)?,
             composite: Composite::new(&gpu, params.supersample)?,
             resident: Resident::new(0),
             target: None,
@@ -211,11 +219,11 @@ impl<'a> Renderer<'a> {
             let probe = probes.probe(index)?;
             let there = self.resident.get(gpu, index, probes::bytes(&probe), || upload(&probe))?;
             clock.lap("load");
-            let place = Place::new(index, &probe, params.gather.probe_weight(t_i));
+            let place = Place::new(index, &probe, params.gather.probe_weight(t_i), GpuProbe::second(&probe));
             self.gather.run(gpu, &mut commands, (&t.view, eye), (&there, &place), &t.sums)?;
         }
         let previous = (t.last_camera.as_ref(), &t.last, &t.glossy);
-        self.composite.fill(gpu, &mut commands, (&t.view, &fine, &t.gathered), &t.sums, previous, &t.layers)?;
+        self.fill.run(gpu, &mut commands, (&t.view, &fine, &t.gathered), &t.sums, previous, &t.layers)?;
         match &self.footprint {
             Some(footprint) => footprint.run(gpu, &mut commands, &fine, &t.view, &t.covariances)?,
             None => gpu.clear(&t.covariances),
@@ -223,14 +231,14 @@ impl<'a> Renderer<'a> {
         let (view, scratch) = (&t.view, &t.scratch);
         let planes = Planes {
             size: view.size,
-            guides: &view.guides,
+            pixels: &view.pixels,
             gathered: &t.gathered,
             covariances: &t.covariances,
             scratch,
             glossy: &t.glossy,
         };
         self.filter.run(&mut commands, &planes)?;
-        self.composite.layers(gpu, &mut commands, (view, &fine), (&t.glossy, mirrors.then_some(&t.mirrored)), &t.layers)?;
+        self.composite.layers(gpu, &mut commands, view, (&t.glossy, mirrors.then_some(&t.mirrored)), &t.layers)?;
         if let Some(coverage) = &self.coverage {
             coverage.run(&self.scene, &mut commands, camera, (view, &t.glossy, mirrors), &t.layers)?;
         }
@@ -248,7 +256,7 @@ impl<'a> Renderer<'a> {
         let ([emission, diffuse, glossy], unserved) = t.layers.read(gpu)?;
         clock.lap("read");
         let buffers = if self.inspect { Some(t.read(gpu)?) } else { None };
-        std::mem::swap(&mut t.view.guides, &mut t.last);
+        std::mem::swap(&mut t.view.pixels, &mut t.last);
         t.last_camera = Some(fine);
         let passes = [clock.laps, passes].concat();
         Ok(Reprojected { emission, diffuse, glossy, passes, unserved, buffers })
@@ -257,18 +265,17 @@ impl<'a> Renderer<'a> {
 
 impl Target {
     fn read(&self, gpu: &Gpu) -> Result<Buffers> {
-        let (colors, sums): (Vec<Vec4>, Vec<Vec4>) = (gpu.read(&self.gathered)?, gpu.read(&self.sums.sums)?);
-        let best: Vec<[u32; 4]> = gpu.read(&self.sums.best)?;
-        let gathered = |((c, s), b): ((&Vec4, &Vec4), &[u32; 4])| Gathered {
+        let (colors, sums): (Vec<Vec4>, Vec<GpuGathered>) = (gpu.read(&self.gathered)?, gpu.read(&self.sums.sums)?);
+        let gathered = |(c, s): (&Vec4, &GpuGathered)| Gathered {
             color: c.xyz(),
             energy: if c.w < FAR { c.w } else { f32::INFINITY },
-            best: (s.w > 0.0).then(|| (b[3] as usize, Vec2::new(f32::from_bits(b[1]), f32::from_bits(b[2])))),
+            best: (s.weight > 0.0).then(|| (s.probe as usize, Vec2::from_array(s.texel))),
         };
         Ok(Buffers {
             width: self.view.size[0] as usize,
-            curvature: gpu.read::<Vec4>(&self.view.curvatures)?.iter().map(|c| [c.x, c.y]).collect(),
+            curvature: self.view.read_curvatures(gpu)?,
             reflected: self.view.read_reflected(gpu)?,
-            gathered: colors.iter().zip(&sums).zip(&best).map(gathered).collect(),
+            gathered: colors.iter().zip(&sums).map(gathered).collect(),
             covariance: gpu.read::<Vec4>(&self.covariances)?.iter().map(|c| c.xyz().to_array()).collect(),
         })
     }

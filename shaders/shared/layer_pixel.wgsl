@@ -1,0 +1,8 @@
+// A pixel of the frame in all its layers.
+
+struct LayerPixel {
+    emission: vec4<f32>,
+    diffuse: vec4<f32>,
+    glossy: vec4<f32>,
+}
+

@@ -1,0 +1,42 @@
+//! All kernels.
+
+use crate::gpu::spec::KernelSpec;
+use crate::gpu::view::{composite, gbuffer, mirror, mirror_light};
+use crate::gpu::{follow, rays};
+use crate::method::glossy_probes::gpu::{coverage, fill, filter, footprint, gather};
+use crate::method::image_space_gather::gpu as image_space_gather;
+use crate::method::lightmap_rt::gpu as lightmap_rt;
+use crate::method::path_trace::{denoise_gpu as denoise, gpu as path_trace};
+use crate::method::ulr::gpu as ulr;
+
+/// The records of all kernels. A file of shaders/ that none of them needs fails the test.
+pub(crate) const KERNELS: &[&KernelSpec] = &[
+    &fill::FILL,
+    &composite::LAYERS,
+    &coverage::COVER,
+    &denoise::ADD_GUIDES,
+    &denoise::DENOISE_END,
+    &denoise::DENOISE_START,
+    &denoise::DESPECKLE,
+    &denoise::SMOOTH_LEVEL,
+    &denoise::WITH_VARIANCE,
+    &filter::FILTER_END,
+    &filter::FILTER_PASS,
+    &filter::FILTER_START,
+    &follow::FOLLOW,
+    &footprint::FOOTPRINT,
+    &gather::FIND_ANCHORS,
+    &gather::GATHER,
+    &gbuffer::GBUFFER,
+    &gbuffer::VIEW_FACTORS,
+    &image_space_gather::GATHER_IMAGE,
+    &lightmap_rt::MEAN_LIGHT,
+    &lightmap_rt::VIEW_STARTS,
+    &mirror::MIRROR_PASS,
+    &mirror_light::MIRROR_LIGHT,
+    &path_trace::ADD_SAMPLES,
+    &path_trace::CAMERA_HITS,
+    &rays::CLOSEST,
+    &ulr::ULR_BLEND,
+    &ulr::ULR_LOOK,
+];
