@@ -125,6 +125,10 @@ fn no_method_knows_another() {
     let mut wrong = Vec::new();
     for source in sources() {
         let path = &source.path;
+        // The test that holds all kernels against their shaders names them all.
+        if path.starts_with("method/contract/") {
+            continue;
+        }
         let Some(mine) = path.strip_prefix("method/").and_then(|p| p.split_once('/')).map(|(folder, _)| folder) else { continue };
         let methods: Vec<String> = std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/method"))
             .unwrap()
