@@ -53,7 +53,7 @@ pub struct Method {
     /// Its parameters, checked, from the options.
     pub parameters: fn(&Options) -> Result<Value>,
     /// Fills in what the scene says of them, where the options have left it open; and warnings.
-    pub for_scene: fn(Value, &Scene) -> Result<(Value, Vec<String>)>,
+    pub for_scene: fn(Value, &Scene) -> Result<ForScene>,
     /// Makes its renderer on the CPU.
     pub cpu: Constructor,
     /// Makes its renderer on a GPU; `None` where there is none.
@@ -186,8 +186,11 @@ pub enum FilterChoice {
     Scene,
 }
 
+/// Parameters, and warnings.
+pub type ForScene = (Value, Vec<String>);
+
 /// [`Method::for_scene`] of a method that asks nothing of the scene.
-pub fn as_given(parameters: Value, _: &Scene) -> Result<(Value, Vec<String>)> {
+pub fn as_given(parameters: Value, _: &Scene) -> Result<ForScene> {
     Ok((parameters, Vec::new()))
 }
 

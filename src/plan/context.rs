@@ -58,8 +58,11 @@ pub struct Context {
     /// Who listens.
     pub listener: Arc<dyn Listener>,
     /// The scene of the last stage: stages run in one process load it once.
-    scene: Arc<Mutex<Option<(PathBuf, Arc<World>)>>>,
+    scene: Arc<Mutex<Option<Loaded>>>,
 }
+
+/// A scene's file, and its opaque part.
+type Loaded = (PathBuf, Arc<World>);
 
 /// What a stage did.
 #[derive(Debug, Default)]

@@ -8,7 +8,7 @@ use crate::base::clock::Clock;
 use crate::base::named::{Parameters, apply, tree, within};
 use crate::base::progress::Progress;
 use crate::gpu::{Gpu, GpuScene};
-use crate::method::{FilterChoice, Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
+use crate::method::{FilterChoice, ForScene, Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
 use crate::scene::Scene;
 use crate::scene::film::Filter;
 use crate::transport::World;
@@ -69,7 +69,7 @@ fn parameters(options: &Options) -> Result<Value> {
 }
 
 /// Depth, roulette and filter: the options', or else the scene's; a box where nobody has chosen.
-fn for_scene(parameters: Value, scene: &Scene) -> Result<(Value, Vec<String>)> {
+fn for_scene(parameters: Value, scene: &Scene) -> Result<ForScene> {
     let mut params: Params = serde_json::from_value(parameters).map_err(|e| Error::Request(e.to_string()))?;
     let path = PathParams::of(scene);
     params.path_trace.path = PathParams { max_depth: params.max_depth.take().unwrap_or(path.max_depth), ..path };
