@@ -47,8 +47,8 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * params.width + id.x;
     var out = vec4(0.0, 0.0, 0.0, FAR);
     if view[i].material != NOT_GLOSSY {
-        if sums[i].weight > 0.0 {
-            out = vec4(sums[i].color / sums[i].weight, sums[i].energy);
+        if sums[i].sum.w > 0.0 {
+            out = vec4(sums[i].sum.rgb / sums[i].sum.w, bitcast<f32>(sums[i].best.x));
         } else {
             var before = vec4(0.0);
             if params.has_previous != 0u {

@@ -108,22 +108,18 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     if params.albedo_ratio != 0u {
         color *= albedo_ratio(shading[i].albedo, found.texel);
     }
-    var sum = vec4(sums[i].color, sums[i].weight);
+    var sum = sums[i].sum;
     var least = FAR;
     if sum.w > 0.0 {
-        least = sums[i].energy;
+        least = bitcast<f32>(sums[i].best.x);
     }
     if found.energy < least {
         if sum.w > 0.0 {
             sum *= exp(-params.falloff * (least - found.energy));
         }
         least = found.energy;
-        sums[i].texel = found.texel;
-        sums[i].energy = found.energy;
-        sums[i].probe = probe.index;
+        sums[i].best = vec4(bitcast<u32>(found.energy), bitcast<vec2<u32>>(found.texel), probe.index);
     }
     let weight = probe.weight * exp(-params.falloff * (found.energy - least));
-    sum += vec4(color, 1.0) * weight;
-    sums[i].color = sum.rgb;
-    sums[i].weight = sum.w;
+    sums[i].sum = sum + vec4(color, 1.0) * weight;
 }

@@ -1,11 +1,8 @@
-// What the gather leaves of a pixel.
+// What the gather leaves of a pixel, in two vectors: each is read and written at once.
 
 struct Gathered {
-    // Sum of colour times weight, and of the weight; 0 as long as no probe had a sample.
-    color: vec3<f32>,
-    weight: f32,
-    // The best sample: its texel, energy and probe.
-    texel: vec2<f32>,
-    energy: f32,
-    probe: u32,
+    // Colour times weight, and the weight; 0 as long as no probe had a sample.
+    sum: vec4<f32>,
+    // The best sample: its energy and texel as bits, and its probe.
+    best: vec4<u32>,
 }

@@ -98,7 +98,7 @@ fn the_checker_sees_a_wrong_struct() {
         assert!(found.contains(expected), "{found}");
     };
     // Renamed, swapped, of another size, and one that the record lacks.
-    said("    probe: u32,\n}", "    probing: u32,\n}", "Gathered: member \"probing\" at 28, in Rust \"probe\" at 28");
+    said("aperture_radius: f32", "aperture: f32", "Camera: member \"aperture\" at 28, in Rust \"aperture_radius\" at 28");
     said(
         "    height: u32,\n    has_previous: u32,",
         "    has_previous: u32,\n    height: u32,",

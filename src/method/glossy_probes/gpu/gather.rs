@@ -84,11 +84,9 @@ struct Anchor {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(crate) struct GpuGathered {
-    color: [f32; 3],
-    pub(crate) weight: f32,
-    pub(crate) texel: [f32; 2],
-    energy: f32,
-    pub(crate) probe: u32,
+    pub(crate) sum: [f32; 4],
+    /// Energy and texel as bits, and the probe.
+    pub(crate) best: [u32; 4],
 }
 
 /// The search of anchors.
@@ -142,7 +140,7 @@ const SEEN: StructLayout = StructLayout {
 const DIRECTIONS: StructLayout = layout!(Directions as "Directions" { normal, reflected, alpha });
 const LIGHT: StructLayout = layout!(Light as "Light" { glossy, object, albedo, reflected_material });
 const ANCHOR: StructLayout = layout!(Anchor as "Anchor" { texel, end, energy });
-pub(crate) const GATHERED: StructLayout = layout!(GpuGathered as "Gathered" { color, weight, texel, energy, probe });
+pub(crate) const GATHERED: StructLayout = layout!(GpuGathered as "Gathered" { sum, best });
 
 impl Params {
     fn new(params: &GatherParams, eye: Vec3, size: [u32; 2]) -> Self {

@@ -269,7 +269,10 @@ impl Target {
         let gathered = |(c, s): (&Vec4, &GpuGathered)| Gathered {
             color: c.xyz(),
             energy: if c.w < FAR { c.w } else { f32::INFINITY },
-            best: (s.weight > 0.0).then(|| (s.probe as usize, Vec2::from_array(s.texel))),
+            best: (s.sum[3] > 0.0).then(|| {
+                let [_, x, y, probe] = s.best;
+                (probe as usize, Vec2::new(f32::from_bits(x), f32::from_bits(y)))
+            }),
         };
         Ok(Buffers {
             width: self.view.size[0] as usize,
