@@ -6,7 +6,7 @@
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use reprobe::base::math::{Frame, hash_words, unit};
+use reprobe::base::math::{Basis, hash_words, unit};
 use reprobe::base::ray::Ray;
 use reprobe::scene::Scene;
 use reprobe::transport::World;
@@ -49,7 +49,7 @@ fn rays(world: &World) -> [Vec<Ray>; 2] {
             }
             let (r, phi) = (u(k + 3).sqrt(), u(k + 4) * std::f32::consts::TAU);
             let local = Vec3::new(r * phi.cos(), r * phi.sin(), (1.0 - r * r).max(0.0).sqrt());
-            ray = s.spawn(Frame::from_normal(n).to_world(local).normalize());
+            ray = s.spawn(Basis::from_normal(n).to_world(local).normalize());
         }
         (out, shadow)
     };

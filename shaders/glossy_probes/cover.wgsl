@@ -36,7 +36,7 @@ var<private> coverage: CoverageParams;
 @group(0) @binding(3) var<storage, read_write> frame: array<LayerPixel>;
 
 // What decides whether two rays see the same.
-struct Seen {
+struct Shown {
     p: vec3<f32>,
     normal: vec3<f32>,
     depth: f32,
@@ -46,26 +46,26 @@ struct Seen {
     material: u32,
 }
 
-fn seen_at(i: u32) -> Seen {
+fn seen_at(i: u32) -> Shown {
     let triangle = view[i].triangle;
     var material = NONE;
     if triangle != NO_TRIANGLE {
         material = facets[7u * triangle + 6u].y;
     }
-    return Seen(view[i].p, view[i].n, view[i].depth, view[i].alpha, material);
+    return Shown(view[i].p, view[i].n, view[i].depth, view[i].alpha, material);
 }
 
-fn same_surface(a: Seen, b: Seen) -> bool {
+fn same_surface(a: Shown, b: Shown) -> bool {
     return a.material == b.material && dot(a.normal, b.normal) > MIN_NORMAL_COS
         && abs(dot(a.normal, b.p - a.p)) < DEPTH_TOLERANCE * a.depth;
 }
 
-fn same_reflected(at: Seen, a: Reflected, b: Reflected) -> bool {
+fn same_reflected(at: Shown, a: Reflected, b: Reflected) -> bool {
     let reach = select(distance(a.point, at.p) + at.depth, 1.0, a.material == SKY);
     return a.material == b.material && distance(a.point, b.point) < REFLECTED_TOLERANCE * reach;
 }
 
-fn is_sharp(s: Seen) -> bool {
+fn is_sharp(s: Shown) -> bool {
     return s.alpha >= 0.0 && s.alpha <= SHARP_ALPHA;
 }
 
@@ -97,7 +97,7 @@ fn has_edge(w: vec4<u32>, width: u32) -> bool {
 }
 
 // The glossy radiance of what a ray at `at` (sub-pixels) sees: that of the sub-pixels that show the same, the nearest most.
-fn glossy_of(w: vec4<u32>, width: u32, seen: Seen, mirrored: Reflected, at: vec2<f32>) -> vec3<f32> {
+fn glossy_of(w: vec4<u32>, width: u32, seen: Shown, mirrored: Reflected, at: vec2<f32>) -> vec3<f32> {
     // Same surface and reflection; same surface; whatever is nearest.
     var all: array<vec4<f32>, 3>;
     for (var y = w.y; y <= w.w; y++) {
@@ -146,7 +146,7 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var k = 0u; k < rays * rays; k++) {
         let at = vec2<f32>(id.xy) + lattice_point(k, rays * rays);
         var ray = camera_ray(camera, at, vec2(0.5));
-        var seen: Seen;
+        var seen: Shown;
         var is_glossy = false;
         var is_lit_mirror = false;
         var mirrored = Reflected(vec3(0.0), NOTHING);
@@ -183,7 +183,7 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
             }
             if bounce == 0u {
                 diffuse += light;
-                seen = Seen(s.p, facing_normal(s, wo), s.t, alpha, s.material);
+                seen = Shown(s.p, facing_normal(s, wo), s.t, alpha, s.material);
                 is_glossy = alpha >= 0.0;
                 is_lit_mirror = is_perfect;
             } else {

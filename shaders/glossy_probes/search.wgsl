@@ -21,8 +21,8 @@ struct Params {
     search: array<vec4<f32>, 8>,
 }
 
-// Struct: candidates::Seen.
-struct Seen {
+// Struct: candidates::ReflectedTexel.
+struct ReflectedTexel {
     reflected_point: vec3<f32>,
     // Of the reflected hit in the lower half, of the reflector in the upper one.
     materials: u32,
@@ -74,7 +74,7 @@ var<private> params: Params;
 // The vertices of the lat-long mesh in the probe, a pair of numbers each, then from `probe.second` on the parameterisation's derivatives:
 // two halves a pixel at half resolution, two pixels an entry.
 @group(0) @binding(4) var<storage, read> map: array<vec2<u32>>;
-@group(0) @binding(5) var<storage, read> seen: array<Seen>;
+@group(0) @binding(5) var<storage, read> seen: array<ReflectedTexel>;
 @group(0) @binding(6) var<storage, read> directions: array<Directions>;
 
 fn mesh_vertex(i: i32) -> vec2<f32> {

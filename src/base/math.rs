@@ -18,7 +18,7 @@ pub fn linear_from_srgb(x: f32) -> f32 {
 
 /// An orthonormal basis; `n` is its third axis ("z" in local coordinates).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct Basis {
     /// First tangent, local x.
     pub s: Vec3,
     /// Second tangent, local y.
@@ -27,7 +27,7 @@ pub struct Frame {
     pub n: Vec3,
 }
 
-impl Frame {
+impl Basis {
     /// A frame about the unit vector `n` (Duff et al. 2017).
     pub fn from_normal(n: Vec3) -> Self {
         let sign = 1f32.copysign(n.z);
@@ -45,12 +45,12 @@ impl Frame {
         }
     }
 
-    /// World to local coordinates; inverse of [`Frame::to_world`].
+    /// World to local coordinates; inverse of [`Basis::to_world`].
     pub fn to_local(&self, v: Vec3) -> Vec3 {
         Vec3::new(self.s.dot(v), self.t.dot(v), self.n.dot(v))
     }
 
-    /// Local to world coordinates; inverse of [`Frame::to_local`].
+    /// Local to world coordinates; inverse of [`Basis::to_local`].
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         self.s * v.x + self.t * v.y + self.n * v.z
     }
@@ -131,7 +131,7 @@ mod tests {
         for i in 0..1000 {
             let uv = Vec2::new((i as f32 * 0.618_034).fract(), (i as f32 + 0.5) / 1000.0);
             let n = direction_from_lat_long(uv);
-            let f = Frame::from_normal(n);
+            let f = Basis::from_normal(n);
             let v = Vec3::new(0.3, -0.5, 0.7);
             assert!((f.to_local(f.to_world(v)) - v).length() < 1e-5);
             assert!((f.s.cross(f.t) - n).length() < 1e-5);

@@ -145,7 +145,7 @@ struct Plane {
 /// The smallest rectangle about the projected triangles, stretched to whole texels.
 fn lay_out(geometry: &Geometry, first: u32, locals: &[u32], plane: &Plane) -> Chart {
     let &Plane { normal, origin, texel, least } = plane;
-    let frame = crate::base::math::Frame::from_normal(normal);
+    let frame = crate::base::math::Basis::from_normal(normal);
     let points: Vec<Vec2> = locals
         .iter()
         .flat_map(|&t| geometry.corners(first + t))

@@ -12,7 +12,7 @@ use super::Atlas;
 use super::adjacency::NONE;
 use super::solid::Orientation;
 use super::texels::{Point, Texels};
-use crate::base::math::{Frame, hash_words};
+use crate::base::math::{Basis, hash_words};
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
 use crate::transport::{Sampler, World};
@@ -62,7 +62,7 @@ impl Visibility<'_> {
 
     /// Sorts a sample point by short rays over its hemisphere; most points need just one.
     pub fn view(&self, surface: &Surface, back: bool, sampler: &mut Sampler) -> Sight {
-        let frame = Frame::from_normal(facing(surface, back));
+        let frame = Basis::from_normal(facing(surface, back));
         let turn = sampler.next_2d();
         for i in 0..4 {
             // Four directions 27 to 63 degrees from the normal, a quarter turn apart.
@@ -100,7 +100,7 @@ impl Visibility<'_> {
     pub fn near_sensor(&self, surface: &Surface, back: bool) -> bool {
         let Some(eye) = self.world.scene.sensor.as_ref().map(|s| s.position()) else { return false };
         let n = facing(surface, back);
-        let frame = Frame::from_normal(n);
+        let frame = Basis::from_normal(n);
         if n.dot(eye - surface.p) > 0.0 && !self.world.occluded(&surface.spawn_to(eye)) {
             return true;
         }

@@ -1,6 +1,6 @@
 //! A point on a surface, with all that a scattering model asks for.
 
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 use crate::base::ray::Ray;
 use glam::{Vec2, Vec3};
 
@@ -23,7 +23,7 @@ pub struct Surface {
     /// Unit geometric normal, as the winding says; it need not face the viewer.
     pub ng: Vec3,
     /// Shading frame: `n` interpolated (or `ng` for face normals), `s` along `dp_du`.
-    pub frame: Frame,
+    pub frame: Basis,
     /// Texture coordinate; the barycentrics where the object has none.
     pub uv: Vec2,
     /// Change of position with u.

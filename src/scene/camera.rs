@@ -68,7 +68,7 @@ impl Camera {
     /// A pinhole at `origin` that looks at `target`.
     pub fn look_at(origin: Vec3, target: Vec3, up: Vec3, fov_x: f32, size: [u32; 2]) -> Self {
         let z = (target - origin).try_normalize().unwrap_or(Vec3::Z);
-        let x = up.cross(z).try_normalize().unwrap_or_else(|| crate::base::math::Frame::from_normal(z).s);
+        let x = up.cross(z).try_normalize().unwrap_or_else(|| crate::base::math::Basis::from_normal(z).s);
         let y = z.cross(x);
         let to_world = Affine3A { matrix3: glam::Mat3A::from_cols(x.into(), y.into(), z.into()), translation: origin.into() };
         Self::pinhole(to_world, fov_x, size)

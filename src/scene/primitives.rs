@@ -6,7 +6,7 @@
 //! and a sphere's poles they are off by up to half a segment.
 
 use super::mesh::Mesh;
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -105,7 +105,7 @@ pub fn sphere(center: Vec3, radius: f32) -> Mesh {
 /// Empty where the two ends coincide.
 pub fn cylinder(p0: Vec3, p1: Vec3, radius: f32) -> Mesh {
     let Some(axis) = (p1 - p0).try_normalize() else { return Mesh::default() };
-    let frame = Frame::from_normal(axis);
+    let frame = Basis::from_normal(axis);
     let half_step = PI / CYLINDER as f32;
     let rim = radius * (half_step / half_step.sin());
     let mut mesh = grid(CYLINDER, 1, |i, j| {

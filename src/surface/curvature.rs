@@ -12,7 +12,7 @@ use super::meyer;
 use super::paraboloid::Curvature;
 use super::tessellate::{TessellationParams, tessellate};
 use super::weld::{Rings, WeldedMesh, is_interior};
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 use crate::base::progress::Progress;
 use crate::scene::{Geometry, Object};
 use glam::{Vec2, Vec3};
@@ -90,7 +90,7 @@ fn object_curvature(geometry: &Geometry, object: &Object, params: &CurvaturePara
         (0..scene_vertices as u32).into_par_iter().map(|v| regularize(&mesh, &rings, &raw, v, min_cos)).collect();
     let own = |(i, normal): (usize, &Vec3)| {
         let c = averaged[mesh.welded[i] as usize];
-        let frame = Frame::from_normal_and_tangent(*normal, c.d1);
+        let frame = Basis::from_normal_and_tangent(*normal, c.d1);
         Curvature { d1: frame.s, d2: frame.t, ..c }
     };
     geometry.normals[vertices].iter().enumerate().map(own).collect()
@@ -113,7 +113,7 @@ fn regularize(mesh: &WeldedMesh, rings: &Rings, raw: &[Option<Curvature>], v: u3
     if normal == Vec3::ZERO {
         return Curvature { k1: 0.0, k2: 0.0, d1: Vec3::X, d2: Vec3::Y };
     }
-    let frame = Frame::from_normal(normal);
+    let frame = Basis::from_normal(normal);
     let mut sum = [0.0f32; 3];
     let mut total = 0.0;
     let mut add = |c: &Option<Curvature>, weight: f32| {
@@ -154,7 +154,7 @@ impl CurvatureMap {
         if geometry.object(triangle).face_normals || corners.iter().all(|&i| self.k1[i] == 0.0 && self.k2[i] == 0.0) {
             return Curvature::plane(normal);
         }
-        let frame = Frame::from_normal(normal);
+        let frame = Basis::from_normal(normal);
         let weights = [1.0 - barycentric.x - barycentric.y, barycentric.x, barycentric.y];
         let mut sum = [0.0f32; 3];
         let mut side = 0.0;

@@ -11,7 +11,7 @@
 //! of the triangles about it (Rusinkiewicz 2004). It sees curvature where a strip of quads has no inner vertex.
 
 use super::paraboloid::Curvature;
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 use glam::{DVec3, Vec3};
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ const SLOPE_ROUNDING: f64 = 1e-5;
 /// Curvature of the closed ring about `p`. `ring` holds (next, previous) neighbours of each triangle in winding order.
 pub fn curvature(p: Vec3, normal: Vec3, ring: &[(Vec3, Vec3)]) -> Curvature {
     let n = normal.as_dvec3();
-    let frame = Frame::from_normal(normal);
+    let frame = Basis::from_normal(normal);
     let (s, t) = (frame.s.as_dvec3(), frame.t.as_dvec3());
     let mut laplacian = DVec3::ZERO;
     let (mut area, mut angle, mut largest) = (0.0, 0.0, 0.0f64);
@@ -91,7 +91,7 @@ pub fn curvature(p: Vec3, normal: Vec3, ring: &[(Vec3, Vec3)]) -> Curvature {
 /// Curvature about `p` from the normals alone, least squares over the edges of all triangles about it.
 /// Each triangle is three (position, normal) pairs.
 pub fn from_normals(normal: Vec3, triangles: impl Iterator<Item = [(Vec3, Vec3); 3]>) -> Curvature {
-    let frame = Frame::from_normal(normal);
+    let frame = Basis::from_normal(normal);
     // Normal equations for the tensor [xx, xy, yy], turning e = (x, y) into Δn = (xx x + xy y, xy x + yy y).
     let mut m = glam::DMat3::ZERO;
     let mut r = DVec3::ZERO;

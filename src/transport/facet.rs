@@ -1,6 +1,6 @@
 //! The differential geometry of a hit, as Mitsuba's meshes have it.
 
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 use crate::base::ray::Hit;
 use crate::material::Surface;
 use crate::material::surface::ray_offset;
@@ -81,13 +81,13 @@ impl Facet {
         };
         let has_uvs = self.extent.is_sign_positive();
         let (dp_du, dp_dv) = has_uvs.then(tangents).flatten().unwrap_or_else(|| {
-            let frame = Frame::from_normal(self.ng);
+            let frame = Basis::from_normal(self.ng);
             (frame.s, frame.t)
         });
         Surface {
             p,
             ng: self.ng,
-            frame: Frame::from_normal_and_tangent(n, dp_du),
+            frame: Basis::from_normal_and_tangent(n, dp_du),
             uv: if has_uvs { ta * w + tb * hit.u + tc * hit.v } else { Vec2::new(hit.u, hit.v) },
             dp_du,
             dp_dv,
@@ -110,7 +110,7 @@ impl Facet {
         Surface {
             p,
             ng: n,
-            frame: Frame::from_normal_and_tangent(n, dp_du),
+            frame: Basis::from_normal_and_tangent(n, dp_du),
             uv: at.uv.as_vec2(),
             dp_du,
             dp_dv,

@@ -468,7 +468,7 @@ mod tests {
             let found = Surface {
                 p: sample.point,
                 ng: Vec3::NEG_Y,
-                frame: crate::base::math::Frame::from_normal(Vec3::NEG_Y),
+                frame: crate::base::math::Basis::from_normal(Vec3::NEG_Y),
                 uv: Vec2::ZERO,
                 dp_du: Vec3::ZERO,
                 dp_dv: Vec3::ZERO,

@@ -1,7 +1,7 @@
 //! The models of scripts/bsdf_reference.py, by name, and the surface that they lie on.
 
 use glam::{Affine2, Vec2, Vec3};
-use reprobe::base::math::{Frame, Rgb};
+use reprobe::base::math::{Basis, Rgb};
 use reprobe::material::bsdf::*;
 use reprobe::material::image::Image;
 use reprobe::material::texture::{Bitmap, Wrap};
@@ -22,7 +22,7 @@ pub fn surface(uv: [f32; 2]) -> Surface {
     Surface {
         p: Vec3::ZERO,
         ng: Vec3::Z,
-        frame: Frame::from_normal_and_tangent(n, dp_du),
+        frame: Basis::from_normal_and_tangent(n, dp_du),
         uv: uv.into(),
         dp_du,
         dp_dv,

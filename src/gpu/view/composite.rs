@@ -1,6 +1,6 @@
 //! The last passes: the twin of [`crate::view::composite`].
 
-use super::{SHADING, View};
+use super::{SHADING, ViewBuffers};
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::gpu::Gpu;
@@ -83,7 +83,7 @@ impl Composite {
         &self,
         gpu: &Gpu,
         commands: &mut Commands,
-        view: &View,
+        view: &ViewBuffers,
         (glossy, mirrored): (&wgpu::Buffer, Option<&wgpu::Buffer>),
         layers: &Layers,
     ) -> Result<()> {

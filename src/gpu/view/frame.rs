@@ -1,6 +1,6 @@
 //! What the baselines share on a device: a view's other layers. Twin of what `render-path` does about [`crate::view::gbuffer`].
 
-use super::View;
+use super::ViewBuffers;
 use super::composite::{Composite, Layers};
 use super::gbuffer::GBuffer;
 use crate::Result;
@@ -27,7 +27,7 @@ pub struct BaselineFrame {
 
 /// Buffers of frames of one size.
 pub(crate) struct Target {
-    pub(crate) view: View,
+    pub(crate) view: ViewBuffers,
     /// The glossy layer, at the view's size.
     pub(crate) glossy: wgpu::Buffer,
     layers: Layers,
@@ -91,7 +91,7 @@ impl Target {
     fn new(gpu: &Gpu, size: [u32; 2], supersample: u32) -> Result<Self> {
         let pixels = area(size);
         Ok(Self {
-            view: View::new(gpu, size)?,
+            view: ViewBuffers::new(gpu, size)?,
             glossy: gpu.output("the glossy pixels", size_of::<Vec4>() as u64 * pixels)?,
             layers: Layers::new(gpu, pixels / u64::from(supersample * supersample))?,
         })

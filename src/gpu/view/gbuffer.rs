@@ -1,6 +1,6 @@
 //! The G-buffer: the twin of [`crate::view::gbuffer`].
 
-use super::{PIXEL, REFLECTED, SHADING, View};
+use super::{PIXEL, REFLECTED, SHADING, ViewBuffers};
 use crate::Result;
 use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
@@ -100,13 +100,13 @@ impl GBuffer {
         scene: &GpuScene,
         commands: &mut Commands,
         camera: &Camera,
-        view: &View,
+        view: &ViewBuffers,
         roughness_scale: Option<f32>,
     ) -> Result<()> {
         let gpu = &scene.gpu;
         let params = Params { camera: camera.into(), roughness_scale: roughness_scale.unwrap_or(-1.0), padding: [0; 3] };
         let params = gpu.uniform("the G-buffer's parameters", &params)?;
-        let View { size, pixels, shading } = view;
+        let ViewBuffers { size, pixels, shading } = view;
         commands.run("gbuffer", &self.gbuffer, &[&params, &self.curved_vertices, &self.curvatures, pixels, shading], *size);
         commands.run("gbuffer", &self.view_factors, &[&params, pixels, shading], *size);
         Ok(())

@@ -1,6 +1,6 @@
 //! Mirror rays: the twin of [`crate::view::mirror`].
 
-use super::{PIXEL, REFLECTED, View};
+use super::{PIXEL, REFLECTED, ViewBuffers};
 use crate::Result;
 use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
@@ -29,7 +29,7 @@ impl Mirror {
     }
 
     /// Fills the reflected hits of a view whose pixels are there.
-    pub(crate) fn run(&self, scene: &GpuScene, commands: &mut Commands, camera: &Camera, view: &View) -> Result<()> {
+    pub(crate) fn run(&self, scene: &GpuScene, commands: &mut Commands, camera: &Camera, view: &ViewBuffers) -> Result<()> {
         let camera = scene.gpu.uniform("the camera", &GpuCamera::from(camera))?;
         commands.run("mirror", &self.0, &[&camera, &view.pixels], view.size);
         Ok(())

@@ -1,6 +1,6 @@
 //! What mirrors show of lamps and diffuse light: the twin of [`crate::view::mirror_light`].
 
-use super::{PIXEL, REFLECTED, View};
+use super::{PIXEL, REFLECTED, ViewBuffers};
 use crate::Result;
 use crate::gpu::camera::{CAMERA, GpuCamera};
 use crate::gpu::commands::Commands;
@@ -51,7 +51,7 @@ impl MirrorLight {
         &self,
         scene: &GpuScene,
         commands: &mut Commands,
-        (camera, view): (&Camera, &View),
+        (camera, view): (&Camera, &ViewBuffers),
         (params, max_first_alpha): (&ChainParams, f32),
         out: &wgpu::Buffer,
     ) -> Result<()> {

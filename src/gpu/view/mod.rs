@@ -61,14 +61,14 @@ pub(crate) fn pixels(gpu: &Gpu, size: [u32; 2]) -> Result<wgpu::Buffer> {
 }
 
 /// The records.
-pub(crate) struct View {
+pub(crate) struct ViewBuffers {
     /// Width and height, pixels.
     pub(crate) size: [u32; 2],
     pub(crate) pixels: wgpu::Buffer,
     pub(crate) shading: wgpu::Buffer,
 }
 
-impl View {
+impl ViewBuffers {
     /// Bytes a pixel.
     pub(crate) const BYTES: u64 = (size_of::<GpuPixel>() + size_of::<GpuShading>()) as u64;
 

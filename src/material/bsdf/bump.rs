@@ -8,7 +8,7 @@
 //! there (its `normalmap` does not), which shows for anisotropic models alone.
 
 use super::{Bsdf, BsdfSample, Lobes, Query, Scatter, Surface};
-use crate::base::math::{Frame, Rgb, luminance};
+use crate::base::math::{Basis, Rgb, luminance};
 use crate::material::Texture;
 use glam::{Vec2, Vec3};
 
@@ -70,7 +70,7 @@ impl Tilted for NormalMap {
 /// The tilted frame as one viewer sees it.
 struct Tilt {
     /// The frame, in the surface's shading frame.
-    local: Frame,
+    local: Basis,
     /// The surface with the tilted frame for its own.
     surface: Surface,
 }
@@ -82,9 +82,9 @@ impl Tilt {
             n = Vec3::new(-n.x, -n.y, n.z);
         }
         let n = n.try_normalize().unwrap_or(Vec3::Z);
-        let local = Frame::from_normal_and_tangent(n, Vec3::X);
+        let local = Basis::from_normal_and_tangent(n, Vec3::X);
         let f = s.frame;
-        let frame = Frame { s: f.to_world(local.s), t: f.to_world(local.t), n: f.to_world(local.n) };
+        let frame = Basis { s: f.to_world(local.s), t: f.to_world(local.t), n: f.to_world(local.n) };
         Self { local, surface: Surface { frame, ..*s } }
     }
 

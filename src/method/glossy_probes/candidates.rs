@@ -12,14 +12,14 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// [`Seen::material`] of a texel that sees no surface.
+/// [`ReflectedTexel::material`] of a texel that sees no surface.
 const NO_SURFACE: u16 = u16::MAX;
 
 /// A probe's texels as the gather sees them, an entry a texel in each list. 76 bytes a texel in all, the same on a GPU.
 #[derive(Default)]
 pub struct Candidates {
     /// What rules most texels out.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<ReflectedTexel>,
     /// What the energy compares besides.
     pub directions: Vec<Directions>,
     /// What is fetched in the end.
@@ -29,14 +29,14 @@ pub struct Candidates {
 /// The reflector's material, and what a mirror there shows.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(16))]
-pub struct Seen {
+pub struct ReflectedTexel {
     pub(crate) reflected_point: Vec3,
     pub(crate) reflected_material: u16,
     /// Material of the reflector.
     pub material: u16,
 }
 
-impl Seen {
+impl ReflectedTexel {
     /// R.
     #[inline]
     pub fn reflected(&self) -> Reflected {
@@ -81,7 +81,11 @@ impl Candidates {
         let material = |object: u32| world.scene.geometry.objects[object as usize].material as u16;
         let seen = |(texel, r): (&Texel, &Option<Reflector>)| {
             let Reflected { point: reflected_point, material: reflected_material } = texel.reflected();
-            Seen { reflected_point, reflected_material, material: r.as_ref().map_or(NO_SURFACE, |r| material(r.object)) }
+            ReflectedTexel {
+                reflected_point,
+                reflected_material,
+                material: r.as_ref().map_or(NO_SURFACE, |r| material(r.object)),
+            }
         };
         let directions = |(texel, r): (&Texel, &Option<Reflector>)| match r {
             Some(r) => Directions { normal: r.normal, reflected: texel.reflected().direction_from(r.position), alpha: r.alpha },

@@ -28,7 +28,7 @@
 //! (G singular), and for broken input, the reflector counts as a plane.
 
 use crate::Result;
-use crate::base::math::{Frame, reflect};
+use crate::base::math::{Basis, reflect};
 use crate::base::named::within;
 use crate::surface::Curvature;
 use glam::{Mat2, Vec2, Vec3};
@@ -103,7 +103,7 @@ pub fn path_hessian(e: Vec3, c: f32, k: Vec2) -> Mat2 {
 #[derive(Debug, Clone, Copy)]
 pub struct Perturbation {
     /// (d1, d2, n) at x: what follows is in these coordinates.
-    frame: Frame,
+    frame: Basis,
     x: Vec3,
     p: Vec3,
     /// Direction from x to the eye; that to q is (-e.x, -e.y, e.z).
@@ -120,7 +120,7 @@ impl Perturbation {
     /// The path from the eye `p` over `x`, whose unit normal `n` faces the eye, to what the mirror ray of that normal meets at
     /// `reflected_distance` from x (infinite for a ray that leaves the scene). `curvature` is relative to `n`.
     pub fn new(p: Vec3, x: Vec3, n: Vec3, reflected_distance: f32, curvature: &Curvature, params: &PerturbParams) -> Self {
-        let frame = Frame::from_normal_and_tangent(n, curvature.d1);
+        let frame = Basis::from_normal_and_tangent(n, curvature.d1);
         let mut e = frame.to_local((p - x).try_normalize().unwrap_or(n));
         if e.z.is_nan() || e.z < MIN_COS {
             e = Vec3::new(e.x, e.y, MIN_COS).normalize_or(Vec3::Z);

@@ -12,7 +12,7 @@ use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::composite::{Composite, Layers};
 use crate::gpu::view::gbuffer::GBuffer;
-use crate::gpu::view::{PIXEL, REFLECTED, View};
+use crate::gpu::view::{PIXEL, REFLECTED, ViewBuffers};
 use crate::lightmap::LightMap;
 use crate::probe::file::{Probe, Texel};
 use crate::probe::store::ProbeStore;
@@ -96,7 +96,7 @@ impl GpuProbe {
 
 /// The buffers of frames of one size.
 struct Target {
-    view: View,
+    view: ViewBuffers,
     /// The samples of least penalty, so many a pixel.
     kept: wgpu::Buffer,
     counts: wgpu::Buffer,
@@ -176,12 +176,12 @@ impl Ulr {
         }
         let kept = size_of::<Sample>() as u64 * u64::from(self.params.blend);
         let (counts, glossy) = (size_of::<Counts>() as u64, size_of::<Vec4>() as u64);
-        let a_sub_pixel = View::BYTES + kept + counts + glossy;
+        let a_sub_pixel = ViewBuffers::BYTES + kept + counts + glossy;
         let frame = area(fine) * a_sub_pixel + area(size) * Layers::BYTES + self.scene.bytes() + self.gbuffer.bytes();
         self.resident.set_budget(room_for_probes(self.memory, size, frame, area(probe) * size_of::<Texel>() as u64)?);
         let gpu = &self.gpu;
         Ok(Target {
-            view: View::new(gpu, fine)?,
+            view: ViewBuffers::new(gpu, fine)?,
             kept: gpu.output("the samples that pixels blend", area(fine) * kept)?,
             counts: gpu.output("their numbers", area(fine) * counts)?,
             glossy: gpu.output("blended colours", area(fine) * glossy)?,

@@ -120,13 +120,12 @@ impl<'a> Builder<'a> {
             _ => 1..=1,
         };
         if !allowed.contains(&nested.len()) {
-            let (found, most) = (nested.len(), allowed.end());
-            return Err(node.at.error(format!("{}: found {found} nested bsdfs, expected {most}", node.plugin)));
+            let message = format!("{}: found {} nested bsdfs, expected {}", node.plugin, nested.len(), allowed.end());
+            return Err(node.at.error(message));
         }
         let mut built = Error::gather(nested.iter().map(|n| self.bsdf(n, depth + 1)).collect::<Vec<_>>())?.into_iter();
         let (first, opacity) = built.next().ok_or_else(|| node.at.error("no nested bsdf"))?;
-        let second = built.next();
-        let boxed = Box::new(first);
+        let (second, boxed) = (built.next(), Box::new(first));
         Ok(match node.plugin.as_str() {
             "twosided" => {
                 // Coverage is the material's: where the sides differ, each has its own.

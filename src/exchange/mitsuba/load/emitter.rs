@@ -37,31 +37,7 @@ impl<'a> Builder<'a> {
                 let local = p.vector("position")?.unwrap_or(Vec3::ZERO);
                 Emitter::Point { position: self.placed(p)?.as_mat4().transform_point3(local), intensity }
             }
-            "spot" => {
-                let intensity = p.color("intensity", Rgb::ONE)? * area_scale;
-                let to_world = self.placed(p)?.as_mat4();
-                let cutoff = p.positive("cutoff_angle", 20.0)?;
-                let beam = not_negative(p, "beam_width", 0.75 * cutoff)?;
-                if beam > cutoff || cutoff > 180.0 {
-                    let message = format!("cutoff_angle = {cutoff}, beam_width = {beam}: expected beam <= cutoff <= 180");
-                    return Err(node.at.error(message));
-                }
-                let pattern = match p.has("texture") {
-                    true => {
-                        let (texture, half) = (self.textured(p, "texture", 1.0)?, Vec2::splat(cutoff.to_radians().tan()));
-                        Some(Box::new(Pattern { texture, to_local: inverse(&to_world), half }))
-                    }
-                    false => None,
-                };
-                Emitter::Spot {
-                    position: to_world.transform_point3(Vec3::ZERO),
-                    direction: axis(p, &to_world)?,
-                    intensity,
-                    cutoff_rad: cutoff.to_radians(),
-                    beam_rad: beam.to_radians(),
-                    pattern,
-                }
-            }
+            "spot" => self.spot(p, area_scale)?,
             "projector" => self.projector(p)?,
             "directional" => {
                 let irradiance = p.color("irradiance", Rgb::ONE)?;
@@ -78,13 +54,40 @@ impl<'a> Builder<'a> {
             "sky" | "sun" | "sunsky" | "timed_sunsky" => {
                 let message =
                     format!("{}: the sun and sky models are not read: render them with Mitsuba to an envmap", node.plugin);
-                return Err(node.at.error(message));
+                return Err(node.at.unsupported(message));
             }
             _ => return Err(Self::unknown(node, "emitter", "area, envmap, constant, point, spot, directional, projector")),
         };
         params.finish(&mut self.scene.warnings);
         self.scene.emitters.push(emitter);
         Ok(())
+    }
+
+    /// A spot; its intensity grows by `area_scale`.
+    fn spot(&mut self, p: &mut Params<'a>, area_scale: f32) -> Result<Emitter> {
+        let intensity = p.color("intensity", Rgb::ONE)? * area_scale;
+        let to_world = self.placed(p)?.as_mat4();
+        let cutoff = p.positive("cutoff_angle", 20.0)?;
+        let beam = not_negative(p, "beam_width", 0.75 * cutoff)?;
+        if beam > cutoff || cutoff > 180.0 {
+            let message = format!("cutoff_angle = {cutoff}, beam_width = {beam}: expected beam <= cutoff <= 180");
+            return Err(p.node.at.error(message));
+        }
+        let pattern = match p.has("texture") {
+            true => {
+                let (texture, half) = (self.textured(p, "texture", 1.0)?, Vec2::splat(cutoff.to_radians().tan()));
+                Some(Box::new(Pattern { texture, to_local: inverse(&to_world), half }))
+            }
+            false => None,
+        };
+        Ok(Emitter::Spot {
+            position: to_world.transform_point3(Vec3::ZERO),
+            direction: axis(p, &to_world)?,
+            intensity,
+            cutoff_rad: cutoff.to_radians(),
+            beam_rad: beam.to_radians(),
+            pattern,
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Builder;
 use crate::Result;
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node, Value};
 use crate::scene::round::RoundKind;
@@ -50,7 +50,7 @@ impl<'a> Builder<'a> {
             }
             "cylinder" => {
                 let (p0, p1, radius) = cylinder(p)?;
-                let frame = Frame::from_normal((p1 - p0).normalize());
+                let frame = Basis::from_normal((p1 - p0).normalize());
                 let axes = DMat3::from_cols(frame.s.as_dvec3() * radius, frame.t.as_dvec3() * radius, (p1 - p0).as_dvec3());
                 (RoundKind::Cylinder, DMat4::from(DAffine3 { matrix3: axes, translation: p0.as_dvec3() }))
             }

@@ -19,7 +19,7 @@
 
 use super::perturb::path_hessian;
 use crate::Result;
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 use crate::base::named::within;
 use crate::scene::Camera;
 use crate::surface::Curvature;
@@ -203,7 +203,7 @@ impl Footprint {
 
     /// Image of a unit tilt of the half vector along each principal direction, pixels.
     fn tilt_to_pixels(&self, camera: &Camera, point: &GlossyPoint, pixels: impl Fn(Vec3) -> Vec2) -> [Vec2; 2] {
-        let frame = Frame::from_normal_and_tangent(point.n, point.curvature.d1);
+        let frame = Basis::from_normal_and_tangent(point.n, point.curvature.d1);
         let to_eye = camera.position() - point.x;
         let mut e = frame.to_local(to_eye.try_normalize().unwrap_or(point.n));
         if e.z < MIN_SLANT {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::base::math::Frame;
+use crate::base::math::Basis;
 
 fn default_table() -> Footprint {
     static TABLE: std::sync::OnceLock<Footprint> = std::sync::OnceLock::new();
@@ -82,7 +82,7 @@ fn brute_force(camera: &Camera, k: f32, q: Vec3, alpha: f32, offset: Vec2) -> f3
         (t, (to + d * t) * k)
     };
     let s = o + d * t;
-    let frame = Frame::from_normal(n);
+    let frame = Basis::from_normal(n);
     let (wi, wo) = (frame.to_local((q - s).normalize()), frame.to_local((o - s).normalize()));
     ggx(alpha, wi, wo) * wi.z / (q - s).length_squared()
 }

@@ -8,7 +8,7 @@ use crate::gpu::scene::GpuScene;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::composite::{LAYER_PIXEL, Layers};
-use crate::gpu::view::{PIXEL, REFLECTED, View};
+use crate::gpu::view::{PIXEL, REFLECTED, ViewBuffers};
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
 
@@ -52,7 +52,7 @@ impl Coverage {
         scene: &GpuScene,
         commands: &mut Commands,
         camera: &Camera,
-        (view, glossy, mirrors): (&View, &wgpu::Buffer, bool),
+        (view, glossy, mirrors): (&ViewBuffers, &wgpu::Buffer, bool),
         layers: &Layers,
     ) -> Result<()> {
         let params = Params {

@@ -9,7 +9,7 @@ use crate::gpu::kernel::Kernel;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::composite::Layers;
-use crate::gpu::view::{PIXEL, REFLECTED, View};
+use crate::gpu::view::{PIXEL, REFLECTED, ViewBuffers};
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
 
@@ -57,7 +57,7 @@ impl Fill {
         &self,
         gpu: &Gpu,
         commands: &mut Commands,
-        (view, camera, gathered): (&View, &Camera, &wgpu::Buffer),
+        (view, camera, gathered): (&ViewBuffers, &Camera, &wgpu::Buffer),
         sums: &Sums,
         (previous, pixels, glossy): (Option<&Camera>, &wgpu::Buffer, &wgpu::Buffer),
         layers: &Layers,

@@ -6,7 +6,7 @@ use crate::gpu::commands::Commands;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
-use crate::gpu::view::{PIXEL, REFLECTED, SHADING, View};
+use crate::gpu::view::{PIXEL, REFLECTED, SHADING, ViewBuffers};
 use crate::method::glossy_probes::footprint;
 use crate::method::glossy_probes::footprint::Foreshortening;
 use crate::{Result, scene};
@@ -62,7 +62,7 @@ impl Footprint {
         gpu: &Gpu,
         commands: &mut Commands,
         camera: &scene::Camera,
-        view: &View,
+        view: &ViewBuffers,
         covariances: &wgpu::Buffer,
     ) -> Result<()> {
         let params = Params {

@@ -7,8 +7,8 @@ use crate::gpu::kernel::{Kernel, area};
 use crate::gpu::resident::{PLACE, Place};
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
-use crate::gpu::view::{PIXEL, REFLECTED, SHADING, View};
-use crate::method::glossy_probes::candidates::{Directions, Light, Seen};
+use crate::gpu::view::{PIXEL, REFLECTED, SHADING, ViewBuffers};
+use crate::method::glossy_probes::candidates::{Directions, Light, ReflectedTexel};
 use crate::method::glossy_probes::gather::{BilinearRule, GatherParams};
 use crate::method::glossy_probes::perturb::{Order, PerturbParams};
 use crate::method::glossy_probes::search::{MAX_RADIUS, TILE};
@@ -133,9 +133,12 @@ const PARAMS: StructLayout = layout!(Params as "Params" {
 });
 /// Two halves of a word are one member to the shader.
 const SEEN: StructLayout = StructLayout {
-    name: "Seen",
-    size: size_of::<Seen>(),
-    fields: &[("reflected_point", offset_of!(Seen, reflected_point)), ("materials", offset_of!(Seen, reflected_material))],
+    name: "ReflectedTexel",
+    size: size_of::<ReflectedTexel>(),
+    fields: &[
+        ("reflected_point", offset_of!(ReflectedTexel, reflected_point)),
+        ("materials", offset_of!(ReflectedTexel, reflected_material)),
+    ],
 };
 const DIRECTIONS: StructLayout = layout!(Directions as "Directions" { normal, reflected, alpha });
 const LIGHT: StructLayout = layout!(Light as "Light" { glossy, object, albedo, reflected_material });
@@ -223,7 +226,7 @@ impl Gather {
         &self,
         gpu: &Gpu,
         commands: &mut Commands,
-        (view, eye): (&View, Vec3),
+        (view, eye): (&ViewBuffers, Vec3),
         (probe, place): (&GpuProbe, &Place),
         out: &Sums,
     ) -> Result<()> {

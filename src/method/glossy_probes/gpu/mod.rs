@@ -25,7 +25,7 @@ use crate::gpu::view::composite::{Composite, Layers};
 use crate::gpu::view::gbuffer::GBuffer;
 use crate::gpu::view::mirror::Mirror;
 use crate::gpu::view::mirror_light::MirrorLight;
-use crate::gpu::view::{GpuPixel, View, pixels};
+use crate::gpu::view::{GpuPixel, ViewBuffers, pixels};
 use crate::lightmap::LightMap;
 use crate::probe::file::Probe;
 use crate::probe::store::ProbeStore;
@@ -47,7 +47,7 @@ const PLANE: u64 = size_of::<Vec4>() as u64;
 
 /// The buffers of frames of one size.
 struct Target {
-    view: View,
+    view: ViewBuffers,
     /// The pixels of the frame before, and its camera.
     last: wgpu::Buffer,
     last_camera: Option<Camera>,
@@ -65,13 +65,13 @@ struct Target {
 
 impl Target {
     /// Bytes a sub-pixel, but for the layers and the anchors.
-    const BYTES: u64 = View::BYTES + size_of::<GpuPixel>() as u64 + Sums::BYTES + Scratch::BYTES + 4 * PLANE;
+    const BYTES: u64 = ViewBuffers::BYTES + size_of::<GpuPixel>() as u64 + Sums::BYTES + Scratch::BYTES + 4 * PLANE;
 
     fn new(gpu: &Gpu, size: [u32; 2], params: &GlossyProbeParams) -> Result<Self> {
         let area = area(size);
         let plane = |label| gpu.output(label, PLANE * area);
         Ok(Self {
-            view: View::new(gpu, size)?,
+            view: ViewBuffers::new(gpu, size)?,
             last: pixels(gpu, size)?,
             last_camera: None,
             sums: Sums::new(gpu, size, &params.gather)?,
@@ -228,19 +228,10 @@ impl<'a> Renderer<'a> {
             Some(footprint) => footprint.run(gpu, &mut commands, &fine, &t.view, &t.covariances)?,
             None => gpu.clear(&t.covariances),
         }
-        let (view, scratch) = (&t.view, &t.scratch);
-        let planes = Planes {
-            size: view.size,
-            pixels: &view.pixels,
-            gathered: &t.gathered,
-            covariances: &t.covariances,
-            scratch,
-            glossy: &t.glossy,
-        };
-        self.filter.run(&mut commands, &planes)?;
-        self.composite.layers(gpu, &mut commands, view, (&t.glossy, mirrors.then_some(&t.mirrored)), &t.layers)?;
+        self.filter.run(&mut commands, &t.planes())?;
+        self.composite.layers(gpu, &mut commands, &t.view, (&t.glossy, mirrors.then_some(&t.mirrored)), &t.layers)?;
         if let Some(coverage) = &self.coverage {
-            coverage.run(&self.scene, &mut commands, camera, (view, &t.glossy, mirrors), &t.layers)?;
+            coverage.run(&self.scene, &mut commands, camera, (&t.view, &t.glossy, mirrors), &t.layers)?;
         }
         clock.restart();
         for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
@@ -258,12 +249,23 @@ impl<'a> Renderer<'a> {
         let buffers = if self.inspect { Some(t.read(gpu)?) } else { None };
         std::mem::swap(&mut t.view.pixels, &mut t.last);
         t.last_camera = Some(fine);
-        let passes = [clock.laps, passes].concat();
-        Ok(Reprojected { emission, diffuse, glossy, passes, unserved, buffers })
+        Ok(Reprojected { emission, diffuse, glossy, passes: [clock.laps, passes].concat(), unserved, buffers })
     }
 }
 
 impl Target {
+    /// What the filter reads and writes.
+    fn planes(&self) -> Planes<'_> {
+        Planes {
+            size: self.view.size,
+            pixels: &self.view.pixels,
+            gathered: &self.gathered,
+            covariances: &self.covariances,
+            scratch: &self.scratch,
+            glossy: &self.glossy,
+        }
+    }
+
     fn read(&self, gpu: &Gpu) -> Result<Buffers> {
         let (colors, sums): (Vec<Vec4>, Vec<GpuGathered>) = (gpu.read(&self.gathered)?, gpu.read(&self.sums.sums)?);
         let gathered = |(c, s): (&Vec4, &GpuGathered)| Gathered {

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::gpu::Gpu;
-use crate::method::glossy_probes::candidates::{Candidates, Directions, Light, Seen};
+use crate::method::glossy_probes::candidates::{Candidates, Directions, Light, ReflectedTexel};
 use crate::probe::file::Probe;
 
 /// A probe's texels and parameterisation, as the gather reads them.
@@ -35,7 +35,7 @@ impl GpuProbe {
 }
 
 /// Bytes a texel, but for the map.
-pub(crate) const TEXEL: u64 = (size_of::<Seen>() + size_of::<Directions>() + size_of::<Light>()) as u64;
+pub(crate) const TEXEL: u64 = (size_of::<ReflectedTexel>() + size_of::<Directions>() + size_of::<Light>()) as u64;
 
 /// What a gathered probe takes on a device, bytes.
 pub(crate) fn bytes(probe: &Probe) -> u64 {
