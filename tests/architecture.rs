@@ -102,7 +102,7 @@ fn arrows_between_rooms_run_down() {
         let path = &source.path;
         let Some(here) = floor(room(path)) else {
             assert!(
-                ["lib.rs", "bin"].contains(&room(&path)),
+                ["lib.rs", "bin"].contains(&room(path)),
                 "{path}: a room without a floor; give it one in this test and ARCHITECTURE.md"
             );
             continue;
@@ -137,7 +137,7 @@ fn no_method_knows_another() {
             .collect();
         for words in source.paths().into_iter().filter(|words| words.first() == Some(&"method")) {
             let is_other = |word: &&str| methods.iter().any(|m| m == word) && *word != mine;
-            if words.get(1).is_some_and(|word| is_other(word)) {
+            if words.get(1).is_some_and(is_other) {
                 wrong.push(format!("{path} names {}", words.join("::")));
             }
         }

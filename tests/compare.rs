@@ -104,7 +104,7 @@ fn what_does_not_fit_together_is_refused_with_both_names() {
     let refused = |a: &str, b: &str, more: &[&str]| message(&compare(&file(a), &file(b), &out, more));
 
     let text = refused("a.exr", "wide.exr", &[]);
-    assert!(text.contains("a.exr has 12 x 11 pixels") && text.contains("wide.exr has 13 x 11:"), "{text}");
+    assert!(text.contains("a.exr: has 12 x 11 pixels") && text.contains("wide.exr has 13 x 11:"), "{text}");
     assert!(refused("tiny.exr", "tiny.exr", &[]).contains("at least 11 x 11"));
     assert!(refused("a.exr", "nan.exr", &[]).contains("nan.exr: pixel (0, 0)"));
     assert!(refused("a.exr", "text.exr", &[]).contains("text.exr: not a readable EXR file"));

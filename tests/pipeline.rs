@@ -167,6 +167,8 @@ fn inputs_from_another_scene_or_another_run_are_refused() {
     f.figures(&render(""));
     std::fs::write(f.at("scene.xml"), SCENE.replace("0.6, 0.5, 0.4", "0.6, 0.5, 0.3")).unwrap();
     let message = f.refusal(&render(""));
+    assert!(message.contains("another scene") && message.contains("curvature.exr"), "{message}");
+    let message = f.refusal("render-path scene.xml --path path.json --size 32x18 --probes out/probes -o again");
     assert!(message.contains("another scene") && message.contains("set.json"), "{message}");
     let message = f.refusal("resmap scene.xml --probes out/probes.json -o out/resmap");
     assert!(message.contains("another scene") && message.contains("probes.json"), "{message}");
@@ -266,6 +268,7 @@ fn every_baseline_writes_the_layers_and_keeps_its_frames() {
         let again = f.figures(&format!("{command} --threads 3"));
         assert_eq!((&again["frames"][0]["kept"], &again["frames"][1]["kept"]), (&Value::Bool(false), &Value::Bool(true)));
         assert!(contents(&f.at(method)) == before, "{method}: other bits with other threads");
+        std::fs::remove_file(f.at(method).join("0000.exr")).unwrap();
         let message = f.refusal(&format!("{command} --device gpu:none"));
         assert!(message.contains("--device"), "{message}");
     }

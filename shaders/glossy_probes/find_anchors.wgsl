@@ -1,4 +1,4 @@
-// Twin of src/method/glossy_probes/gather.rs: best_samples.
+// Twin of src/method/glossy_probes/search.rs: best_samples.
 // Searches for one pixel in so many in full; gather.wgsl does those between, from where these ended.
 
 // #include "glossy_probes/search.wgsl"

@@ -1,3 +1,4 @@
+// Twin of src/view/gbuffer.rs: pixel.
 // What a view sees of a surface: its roughness, the light of its diffuse lobe, the albedo of its glossy ones.
 
 // #include "shared/albedo.wgsl"

@@ -1,3 +1,4 @@
+// Twin of src/view/layers.rs: LayerImages.
 // A pixel of the frame in all its layers.
 
 struct LayerPixel {

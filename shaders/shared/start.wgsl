@@ -1,3 +1,4 @@
+// Twin of src/transport/follow.rs: PathStart.
 // Where a path begins: a point of a triangle, and the random stream of its samples.
 struct PathStart {
     // NO_TRIANGLE: there is no path.

@@ -27,8 +27,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// All methods, the default first.
-pub const METHODS: [&Method; 5] =
-    [&glossy_probes::METHOD, &path_trace::METHOD, &ulr::METHOD, &image_space_gather::METHOD, &lightmap_rt::METHOD];
+pub const METHODS: &[&Method] =
+    &[&glossy_probes::METHOD, &path_trace::METHOD, &ulr::METHOD, &image_space_gather::METHOD, &lightmap_rt::METHOD];
 
 /// A row of the table.
 pub struct Method {
@@ -68,8 +68,8 @@ pub type GpuConstructor = for<'a> fn(Arc<Gpu>, &Setup<'a>) -> Result<Box<dyn Ren
 impl Method {
     /// The row of a name.
     pub fn find(name: &str) -> Result<&'static Self> {
-        let known = || METHODS.map(|m| m.name).join(", ");
-        let row = METHODS.into_iter().find(|m| m.name == name);
+        let known = || METHODS.iter().map(|m| m.name).collect::<Vec<_>>().join(", ");
+        let row = METHODS.iter().copied().find(|m| m.name == name);
         row.ok_or_else(|| Error::Request(format!("no method \"{name}\"; there are {}", known())))
     }
 

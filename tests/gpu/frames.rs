@@ -50,11 +50,15 @@ impl Baked {
         Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args.split_whitespace()).current_dir(self.0.path()).output().unwrap()
     }
 
-    /// Renders into the folder `name`, on the CPU without a device.
+    /// Renders into the folder `name`, on the CPU without a device. Options of another method begin with `--method`.
     pub fn render(&self, name: &str, device: Option<&Device>, options: &str) -> Output {
         let choice = device.map_or("cpu", |d| d.name.as_str());
-        let inputs = "--probes out/probes --lightmap out/lightmap.exr --curvature out/curvature.exr --path path.json";
-        let mut args = vec!["render-path", "scene.xml", "-o", name, "--device", choice, "--json"];
+        let inputs = match options.split_whitespace().nth(1).filter(|_| options.starts_with("--method")) {
+            Some("ulr") => "--probes out/probes --lightmap out/lightmap.exr",
+            Some(_) => "--lightmap out/lightmap.exr",
+            None => "--probes out/probes --lightmap out/lightmap.exr --curvature out/curvature.exr",
+        };
+        let mut args = vec!["render-path", "scene.xml", "--path", "path.json", "-o", name, "--device", choice, "--json"];
         args.extend(inputs.split_whitespace().chain(options.split_whitespace()));
         let mut command = Command::new(env!("CARGO_BIN_EXE_reprobe"));
         if let Some(device) = device {

@@ -77,7 +77,7 @@ pub struct Args {
 
 /// The table's methods.
 pub fn methods() -> PossibleValuesParser {
-    PossibleValuesParser::new(METHODS.map(|m| PossibleValue::new(m.name).help(m.about)))
+    PossibleValuesParser::new(METHODS.iter().map(|m| PossibleValue::new(m.name).help(m.about)))
 }
 
 /// Help for an option, after the methods that use it.

@@ -92,7 +92,7 @@ pub(crate) struct GpuGathered {
 /// The search of anchors.
 pub(crate) const FIND_ANCHORS: KernelSpec = KernelSpec {
     file: "glossy_probes/find_anchors.wgsl",
-    twin: "src/method/glossy_probes/gather.rs: best_samples",
+    twin: "src/method/glossy_probes/search.rs: best_samples",
     workgroup: [8, 8],
     scene: false,
     bindings: &[

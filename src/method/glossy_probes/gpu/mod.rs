@@ -234,11 +234,9 @@ impl<'a> Renderer<'a> {
             coverage.run(&self.scene, &mut commands, camera, (&t.view, &t.glossy, mirrors), &t.layers)?;
         }
         clock.restart();
-        for (index, _) in next.map_or(vec![], |c| nearest_probes(&probes.set.grid, c.position(), params.gather.probes)) {
-            // What fails here fails again when that frame is rendered.
-            if let Ok(probe) = probes.probe(index) {
-                self.resident.upload_ahead(gpu, index, probes::bytes(&probe), || upload(&probe))?;
-            }
+        if let Some(next) = next {
+            let wanted = nearest_probes(&probes.set.grid, next.position(), params.gather.probes);
+            upload_ahead((gpu, &mut self.resident), probes, &wanted, upload)?;
         }
         clock.lap("load");
         let passes = commands.finish()?;
@@ -251,6 +249,22 @@ impl<'a> Renderer<'a> {
         t.last_camera = Some(fine);
         Ok(Reprojected { emission, diffuse, glossy, passes: [clock.laps, passes].concat(), unserved, buffers })
     }
+}
+
+/// Uploads what the next view wants, by index and distance, as far as there is room.
+fn upload_ahead(
+    (gpu, resident): (&Gpu, &mut Resident<GpuProbe>),
+    probes: &mut ProbeStore<Served>,
+    wanted: &[(usize, f32)],
+    upload: impl Fn(&Probe) -> Result<GpuProbe>,
+) -> Result<()> {
+    for &(index, _) in wanted {
+        // What fails here fails again when that frame is rendered.
+        if let Ok(probe) = probes.probe(index) {
+            resident.upload_ahead(gpu, index, probes::bytes(&probe), || upload(&probe))?;
+        }
+    }
+    Ok(())
 }
 
 impl Target {
