@@ -306,3 +306,72 @@ fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
     assert!(f.refusal(&command("--method ulr --probes out/probes -o d --denoise")).contains("path-trace has"));
     assert!(f.refusal(&command("--method ulr --probes out/probes -o d --set supersample=0")).contains("1 to 8"));
 }
+
+#[test]
+fn nothing_is_written_over_an_input_or_a_file_of_somebody_elses() {
+    let f = Folder::new();
+    for (name, text) in [("ball.obj", "v 0 0 0\n"), ("notes.json", "{}")] {
+        std::fs::write(f.at(name), text).unwrap();
+    }
+    let before = contents(f.0.path());
+    for (command, expected) in [
+        ("place-probes scene.xml --grid 1x1x1 -o scene.xml", "an input"),
+        ("place-probes scene.xml --path path.json -o ./path.json", "an input"),
+        ("place-probes scene.xml --grid 1x1x1 -o notes.json", "not written by reprobe"),
+        ("curvature scene.xml -o ball.obj", "not written by reprobe"),
+        ("bake-lightmap scene.xml -o ball.obj", "not written by reprobe"),
+    ] {
+        let message = f.refusal(command);
+        assert!(message.contains(expected), "{command}: {message}");
+    }
+    assert!(contents(f.0.path()) == before, "something was written");
+}
+
+#[test]
+fn outputs_that_are_up_to_date_are_as_new_as_if_they_were_written() {
+    let f = Folder::new();
+    f.figures(&format!("{RUN} --no-reference"));
+    let old = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
+    let light = "bake-lightmap scene.xml -o l.exr --spp 1 --texel 0.5";
+    let resmap = "resmap scene.xml --probes out/probes.json -o r --size 16x8";
+    let qhmap = "qhmap r -o q --size 16x8";
+    let bake = "bake-probes scene.xml --probes out/probes.json --qhmap q --spp 1 -o p";
+    for (command, file) in [(light, "l.exr"), (resmap, "r/set.json"), (qhmap, "q/set.json"), (bake, "p/set.json")] {
+        f.figures(command);
+        let text = std::fs::read(f.at(file)).unwrap();
+        std::fs::File::options().write(true).open(f.at(file)).unwrap().set_modified(old).unwrap();
+        f.figures(command);
+        assert!(std::fs::metadata(f.at(file)).unwrap().modified().unwrap() > old, "{command}: make would ask for it for ever");
+        assert!(std::fs::read(f.at(file)).unwrap() == text, "{command}");
+    }
+}
+
+#[test]
+fn threads_have_a_bound() {
+    let f = Folder::new();
+    assert!(f.refusal("curvature scene.xml -o c.exr --threads 100000").contains("expected 1 to 1024"));
+    assert!(f.refusal("curvature scene.xml -o c.exr --threads 0").contains("expected 1 to 1024"));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_device_behind_stdout_is_an_error_and_a_closed_pipe_is_none() {
+    let f = Folder::new();
+    let command = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_reprobe"));
+        command.args(["curvature", "scene.xml", "-o", "c.exr"]).current_dir(f.0.path());
+        command
+    };
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = command().stdout(full).output().unwrap();
+    let message = text(&output.stderr);
+    assert!(
+        output.status.code() == Some(2) && message.contains("cannot be printed") && !message.contains("panicked"),
+        "{message}"
+    );
+    // The reading end is closed before anything is written.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = command().stdout(writer).output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
+}

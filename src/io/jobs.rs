@@ -5,6 +5,7 @@ use super::{ExrImage, Provenance};
 use crate::Result;
 use rayon::prelude::*;
 use std::path::Path;
+use std::time::SystemTime;
 
 /// `--shard I/N`: items I, I + N, I + 2N, ...
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +53,14 @@ pub struct Done {
 /// Whether an earlier run with the same inputs and parameters finished this file.
 pub fn is_finished(file: &Path, provenance: &Provenance) -> bool {
     ExrImage::read_provenance(file).is_ok_and(|found| found.as_ref() == Some(provenance))
+}
+
+/// Makes a file that is up to date as new as if it were written now, so that make does not ask for it again. Where that is not
+/// allowed it is up to date all the same.
+pub fn touch(file: &Path) {
+    if let Ok(file) = std::fs::File::options().write(true).open(file) {
+        let _ = file.set_modified(SystemTime::now());
+    }
 }
 
 /// Makes those of `items` that are not kept and are `shard`'s, in order; and when all are there, seals the whole.

@@ -9,6 +9,7 @@ pub mod context;
 pub mod evaluation;
 pub mod frames;
 pub mod option;
+pub mod overwrite;
 pub mod pipeline;
 pub mod settings;
 pub mod stage;

@@ -1,7 +1,7 @@
 //! A stage of a pipeline: one of the subcommands that read files and write files.
 
 use super::stages::{BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
-use super::{Context, Outcome};
+use super::{Context, Outcome, overwrite};
 use crate::Result;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -101,8 +101,26 @@ impl Stage {
         }
     }
 
+    /// The scene and the camera path that it reads.
+    fn sources(&self) -> Vec<&PathBuf> {
+        match self {
+            Self::PlaceProbes(s) => [&s.scene].into_iter().chain(&s.path).collect(),
+            Self::Resmap(s) => vec![&s.scene],
+            Self::Curvature(s) => vec![&s.scene],
+            Self::BakeLightmap(s) => vec![&s.scene],
+            Self::BakeProbes(s) => [&s.scene].into_iter().chain(&s.for_path).collect(),
+            Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
+            Self::Qhmap(_) => vec![],
+            Self::Compare(s) => s.second_reference.iter().collect(),
+        }
+    }
+
     /// Checks, reads, computes and writes.
+    ///
+    /// # Errors
+    /// What it reads is not as it should be, or what it would write is an input, or a file of somebody else's.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
+        overwrite::refuse(self.output(), self.inputs().into_iter().chain(self.sources()))?;
         with!(self, s => s.run(cx))
     }
 

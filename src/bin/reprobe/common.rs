@@ -6,7 +6,11 @@ use reprobe::base::progress::Progress;
 use reprobe::exchange::LoadOptions;
 use reprobe::gpu::Choice;
 use reprobe::plan::{Context, Listener, Outcome};
+use std::io::{ErrorKind, Write as _};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// More threads than this are a slip of the hand.
+const MOST_THREADS: usize = 1024;
 
 /// Options of every subcommand.
 #[derive(clap::Args)]
@@ -48,8 +52,8 @@ impl Common {
     /// Sets up the thread pool.
     pub fn start(&self) -> anyhow::Result<()> {
         if let Some(n) = self.threads {
-            if n == 0 {
-                bail!("--threads 0: expected at least 1");
+            if !(1..=MOST_THREADS).contains(&n) {
+                bail!("--threads {n}: expected 1 to {MOST_THREADS}");
             }
             rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")?;
         }
@@ -72,12 +76,17 @@ impl Common {
         Ok(Context::new(self.seed, self.device.clone(), load, terminal)?)
     }
 
-    /// Prints a result to stdout.
-    pub fn report(&self, outcome: &Outcome) {
-        if self.json {
-            println!("{}", outcome.figures);
-        } else if !self.quiet && !outcome.summary.is_empty() {
-            println!("{}", outcome.summary.trim_end());
+    /// Prints a result to stdout. Whoever closes it early has seen enough.
+    pub fn report(&self, outcome: &Outcome) -> anyhow::Result<()> {
+        let text = match &outcome.summary {
+            _ if self.json => outcome.figures.to_string(),
+            summary if !self.quiet && !summary.is_empty() => summary.trim_end().to_owned(),
+            _ => return Ok(()),
+        };
+        let mut stdout = std::io::stdout().lock();
+        match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+            Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(e).context("the result cannot be printed"),
+            _ => Ok(()),
         }
     }
 }

@@ -49,12 +49,15 @@ enum Command {
 
 fn main() -> ExitCode {
     let Cli { common, command } = Cli::parse();
-    let result = common.start().and_then(|()| common.context()).and_then(|cx| dispatch(command, &cx));
-    match result {
-        Ok(outcome) => {
-            common.report(&outcome);
-            if outcome.check_failed { ExitCode::from(1) } else { ExitCode::SUCCESS }
-        }
+    let run = || {
+        common.start()?;
+        let outcome = dispatch(command, &common.context()?)?;
+        common.report(&outcome)?;
+        anyhow::Ok(outcome)
+    };
+    match run() {
+        Ok(outcome) if outcome.check_failed => ExitCode::from(1),
+        Ok(_) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("reprobe: error: {error:#}");
             ExitCode::from(2)

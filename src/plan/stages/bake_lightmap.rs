@@ -3,7 +3,7 @@
 use crate::base::clock::seconds;
 use crate::base::named::within;
 use crate::gpu::{GpuScene, Paths};
-use crate::io::jobs::{Done, Shard, is_finished};
+use crate::io::jobs::{Done, Shard, is_finished, touch};
 use crate::io::{ExrImage, Provenance};
 use crate::lightmap::parts::Folder;
 use crate::lightmap::{AtlasParams, LightMap, LightMapParams, Plan, lookup};
@@ -74,6 +74,7 @@ impl BakeLightmap {
         let loaded = clock();
         let provenance = Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params);
         if is_finished(&self.output, &provenance) {
+            touch(&self.output);
             let summary = format!("{}: up to date", self.output.display());
             return Ok(Outcome { summary, figures: json!({ "up_to_date": true }), ..Outcome::default() });
         }

@@ -4,7 +4,7 @@ use crate::base::clock::seconds;
 use crate::base::named::{Parameters, split, within};
 use crate::gpu::{GpuScene, Paths};
 use crate::io::Provenance;
-use crate::io::jobs::{Done, Shard, complete, is_finished};
+use crate::io::jobs::{Done, Shard, complete, is_finished, touch};
 use crate::io::provenance::hash_file;
 use crate::lightmap::LightMap;
 use crate::method::Options;
@@ -170,6 +170,7 @@ impl BakeProbes {
             provenance = provenance.with_input("lightmap", hash_file(file)?);
         }
         if ProbeStore::<Served>::open(&self.output, scene, 0).is_ok_and(|found| found.set.provenance == provenance) {
+            touch(&ProbeSet::path(&self.output));
             let summary = format!("{}: up to date", self.output.display());
             return Ok(Outcome { summary, figures: json!({ "baked": 0, "up_to_date": true }), ..Outcome::default() });
         }

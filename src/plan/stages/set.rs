@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::base::progress::Progress;
-use crate::io::jobs::{Done, complete, is_finished};
+use crate::io::jobs::{Done, complete, is_finished, touch};
 use crate::probe::set::{ProbeSet, numbered};
 use rayon::prelude::*;
 use std::path::Path;
@@ -38,5 +38,12 @@ pub fn fill<S: Send>(
         progress.finish();
         Ok(())
     };
-    complete(&items, None, &is_kept, make_all, || if sealed { Ok(()) } else { set.write(folder) })
+    let seal = || {
+        if sealed {
+            touch(&ProbeSet::path(folder));
+            return Ok(());
+        }
+        set.write(folder)
+    };
+    complete(&items, None, &is_kept, make_all, seal)
 }

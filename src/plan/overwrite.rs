@@ -1,0 +1,78 @@
+//! Outputs that would destroy something: an input of the same command, or a file that no stage wrote.
+
+use crate::io::ExrImage;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Refuses to write `output` where it is one of `inputs` (files or folders, by whatever name), or a file that is not a stage's.
+pub fn refuse<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+    let Ok(there) = output.canonicalize() else { return Ok(()) };
+    if inputs.into_iter().any(|input| input.canonicalize().is_ok_and(|input| input == there)) {
+        return Err(Error::input(output, "is an input of this command too: give the output another name"));
+    }
+    if there.is_file() && is_foreign(&there)? {
+        return Err(Error::input(output, "was not written by reprobe: remove it, or give the output another name"));
+    }
+    Ok(())
+}
+
+/// Whether a file is not a stage's output. One that was ours before something damaged it is not foreign, so that it can be made anew.
+fn is_foreign(file: &Path) -> Result<bool> {
+    let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
+    Ok(match bytes.first() {
+        None => false,
+        Some(b'{') => serde_json::from_slice::<serde_json::Value>(&bytes).is_ok_and(|value| value.get("provenance").is_none()),
+        Some(_) if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) => {
+            ExrImage::read_provenance(file).is_ok_and(|found| found.is_none())
+        }
+        Some(_) => true,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::{Provenance, Samples};
+
+    #[test]
+    fn inputs_and_other_peoples_files_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let file = |name: &str, bytes: &[u8]| {
+            std::fs::write(at(name), bytes).unwrap();
+            at(name)
+        };
+        let picture = |provenance: Option<Provenance>| {
+            let channels = vec![("Y".into(), Samples::F32(vec![1.0]))];
+            ExrImage { width: 1, height: 1, channels, provenance, to_rec709: None }
+        };
+        let ours = picture(Some(Provenance::new("curvature", "", 0, &0)));
+        ours.write(&at("ours.exr")).unwrap();
+        picture(None).write(&at("photograph.exr")).unwrap();
+        let whole = std::fs::read(at("ours.exr")).unwrap();
+        let none: [&PathBuf; 0] = [];
+        for kept in [
+            file("vase.obj", b"v 0 0 0\n"),
+            file("path.json", br#"{"frames": []}"#),
+            file("list.json", b"[]"),
+            at("photograph.exr"),
+        ] {
+            assert!(refuse(&kept, none).unwrap_err().to_string().contains("not written by reprobe"), "{}", kept.display());
+        }
+        for made_anew in [
+            at("new.exr"),
+            at("ours.exr"),
+            file("cut.exr", &whole[..whole.len() / 2]),
+            file("empty.exr", b""),
+            file("probes.json", br#"{"provenance": {}}"#),
+            file("cut.json", br#"{"prov"#),
+            folder.path().to_owned(),
+        ] {
+            refuse(&made_anew, none).unwrap();
+        }
+        // The same file and folder by other names.
+        let other = folder.path().join(".").join("ours.exr");
+        assert!(refuse(&other, [&at("ours.exr")]).unwrap_err().to_string().contains("an input"));
+        assert!(refuse(&folder.path().join("."), [&folder.path().to_owned()]).is_err());
+    }
+}
