@@ -375,3 +375,27 @@ fn a_full_device_behind_stdout_is_an_error_and_a_closed_pipe_is_none() {
     let output = command().stdout(writer).output().unwrap();
     assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
 }
+
+#[test]
+fn frames_that_an_earlier_run_left_are_not_counted() {
+    let f = Folder::new();
+    f.figures(RUN);
+    // Frame 0 stays in the folders, of another size and seed.
+    f.figures(&format!("{RUN} --size 48x27 --frames 1 --seed 7").replace("--size 32x18 ", ""));
+    for report in ["report", "report-glossy"] {
+        let metrics: Value =
+            serde_json::from_slice(&std::fs::read(f.at("out").join(report).join("metrics.json")).unwrap()).unwrap();
+        let names: Vec<&str> = metrics["frames"].as_array().unwrap().iter().map(|f| f["name"].as_str().unwrap()).collect();
+        assert_eq!(names, ["0001"]);
+        assert_eq!(metrics["mean"]["rmse_rgb"], metrics["frames"][0]["rmse_rgb"]);
+    }
+    // All of a path's frames, where its end was cut off.
+    let (first, _) = PATH.split_once("}, {").unwrap();
+    std::fs::write(f.at("path.json"), format!("{first}}}]}}")).unwrap();
+    let figures = f.figures(RUN);
+    let compared = figures["stages"].as_array().unwrap().last().unwrap();
+    assert!(compared["command"].as_str().unwrap().contains("--frames 0"), "{compared}");
+    assert_eq!(compared["figures"]["frames"].as_array().unwrap().len(), 1);
+    assert!(f.refusal("compare out/frames out/reference -o c --frames 5").contains("none of the frames 5"));
+    assert!(f.refusal("compare out/frames/0000.exr out/reference/0000.exr -o c --frames 0").contains("two folders"));
+}

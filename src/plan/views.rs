@@ -11,6 +11,18 @@ use std::path::Path;
 pub struct FrameList(Vec<std::ops::RangeInclusive<u32>>);
 
 impl FrameList {
+    /// These frames, in ascending order.
+    pub fn of(frames: impl IntoIterator<Item = u32>) -> Self {
+        let mut ranges: Vec<std::ops::RangeInclusive<u32>> = Vec::new();
+        for frame in frames {
+            match ranges.last_mut() {
+                Some(last) if last.end().checked_add(1) == Some(frame) => *last = *last.start()..=frame,
+                _ => ranges.push(frame..=frame),
+            }
+        }
+        Self(ranges)
+    }
+
     /// Whether it has a frame.
     pub fn has(&self, frame: u32) -> bool {
         self.0.iter().any(|r| r.contains(&frame))
@@ -78,6 +90,7 @@ mod tests {
     #[test]
     fn frame_lists_parse_and_print() {
         assert_eq!("0,3,5-8".parse::<FrameList>().unwrap().to_string(), "0,3,5-8");
+        assert_eq!(FrameList::of([0, 3, 5, 6, 7, 8]).to_string(), "0,3,5-8");
         for bad in ["", "a", "3-1", "1,,2", "-1"] {
             assert!(bad.parse::<FrameList>().is_err(), "{bad}");
         }

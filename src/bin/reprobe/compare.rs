@@ -1,6 +1,7 @@
 //! `reprobe compare`.
 
 use reprobe::plan::stages::Compare;
+use reprobe::plan::views::FrameList;
 use std::path::PathBuf;
 
 /// Measures frames against their references: metrics.json, error maps and a page to look at
@@ -19,6 +20,9 @@ pub struct Args {
     /// Folder for metrics.json, index.html and images/
     #[arg(long, short, value_name = "FOLDER")]
     output: PathBuf,
+    /// Which frames of two folders, like 0,3,5-8 [default: all, the same in both]
+    #[arg(long, value_name = "LIST")]
+    frames: Option<FrameList>,
     /// Layer to compare, such as glossy [default: the full image]
     #[arg(long, value_name = "NAME", default_value = "full", hide_default_value = true)]
     layer: String,
@@ -36,7 +40,17 @@ pub struct Args {
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> Compare {
-        let Self { image, reference, second_reference, output, layer, exposure, max_rmse, max_dssim } = self;
-        Compare { image, reference, second_reference, output, layer: Some(layer), exposure: Some(exposure), max_rmse, max_dssim }
+        let Self { image, reference, second_reference, output, frames, layer, exposure, max_rmse, max_dssim } = self;
+        Compare {
+            image,
+            reference,
+            second_reference,
+            output,
+            frames,
+            layer: Some(layer),
+            exposure: Some(exposure),
+            max_rmse,
+            max_dssim,
+        }
     }
 }

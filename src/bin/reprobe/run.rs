@@ -144,15 +144,31 @@ fn stages(args: &Args, comparisons: &[Comparison]) -> Vec<Stage> {
     for (layer, report, _) in comparisons {
         let layer = layer.map(str::to_owned);
         let (image, reference, output) = (out("frames"), reference.clone(), out(report));
-        list.push(Compare { image, reference, layer, output, ..Compare::default() }.into());
+        list.push(Compare { image, reference, layer, output, frames: args.frames.clone(), ..Compare::default() }.into());
     }
     list
+}
+
+/// The numbers of the frames that a run of `render-path` wrote or kept.
+fn frames_of(rendered: &Outcome) -> Vec<u32> {
+    let frames = rendered.figures["frames"].as_array();
+    frames.into_iter().flatten().filter_map(|f| f["name"].as_str()?.strip_suffix(".exr")?.parse().ok()).collect()
+}
+
+/// Keeps frames that a run with other options left in a folder out of the comparison.
+fn leave_out_others(compare: &mut Compare, rendered: &[u32]) -> anyhow::Result<()> {
+    for folder in [&compare.image, &compare.reference] {
+        if frame_names(folder)?.len() != rendered.len() {
+            compare.frames = Some(FrameList::of(rendered.iter().copied()));
+        }
+    }
+    Ok(())
 }
 
 pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
     let clock = seconds();
     let comparisons = comparisons(args)?;
-    let stages = stages(args, &comparisons);
+    let mut stages = stages(args, &comparisons);
     for stage in &stages {
         stage.check()?;
     }
@@ -161,8 +177,15 @@ pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
         return Ok(Outcome { summary: lines.join("\n"), figures: json!({ "commands": lines }), ..Outcome::default() });
     }
     let mut figures = Vec::new();
-    for stage in &stages {
+    let mut rendered = Vec::new();
+    for stage in &mut stages {
+        if let Stage::Compare(compare) = stage {
+            leave_out_others(compare, &rendered)?;
+        }
         let outcome = execute(stage, cx, "")?;
+        if matches!(stage, Stage::RenderPath(_)) {
+            rendered = frames_of(&outcome);
+        }
         figures.push(json!({ "command": stage.command_line(cx), "figures": outcome.figures }));
     }
     let (out, seconds) = (args.output.display(), clock());

@@ -7,6 +7,7 @@ use crate::metric::report::{FrameMetrics, Picture, Report};
 use crate::metric::without_noise::without_noise;
 use crate::metric::{Metrics, Raster, compare, ssim};
 use crate::plan::option::stage;
+use crate::plan::views::FrameList;
 use crate::plan::{Context, Outcome};
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -25,6 +26,8 @@ stage! {
     {
         /// The reference rendered again with another seed.
         "--second-reference" second_reference: Option<PathBuf>,
+        /// Which frames of two folders; all, which must be the same ones, where it is not given.
+        "--frames" frames: Option<FrameList>,
         /// Layer to compare.
         "--layer" layer: Option<String>,
         /// Stops by which radiance is brightened.
@@ -74,7 +77,7 @@ impl Compare {
     /// Reads, measures and draws all frames.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
-        let pairs = pairs(&self.image, &self.reference)?;
+        let pairs = pairs(&self.image, &self.reference, self.frames.as_ref())?;
         let progress = cx.progress();
         progress.start("compare", pairs.len() as u64);
         let frames: Vec<Measured> = pairs
@@ -177,8 +180,8 @@ fn read(path: &Path, layer: &str) -> Result<Raster> {
     Ok(Raster { size: [image.width, image.height], pixels })
 }
 
-/// The frames of two files, or of two folders with the same file names.
-fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>> {
+/// The frames of two files, or of two folders with the same file names: those of `frames` alone, where they are given.
+fn pairs(a: &Path, b: &Path, frames: Option<&FrameList>) -> Result<Vec<Pair>> {
     for p in [a, b] {
         if !p.exists() {
             return Err(Error::input(p, "no such file or folder"));
@@ -186,9 +189,10 @@ fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>> {
     }
     let stem = |p: &Path| p.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     match (a.is_dir(), b.is_dir()) {
+        (false, false) if frames.is_some() => Err(Error::Request("--frames: expected two folders, found two files".into())),
         (false, false) => Ok(vec![Pair { name: stem(a), files: [a.into(), b.into()] }]),
         (true, true) => {
-            let (in_a, in_b) = (frame_names(a)?, frame_names(b)?);
+            let (in_a, in_b) = (chosen(a, frames)?, chosen(b, frames)?);
             let lacks = |here: &Path, name: &String, there: &Path, counts: [usize; 2]| {
                 let [n, m] = counts;
                 Error::input(here, format!("no {name}, which {} has ({n} frames here, {m} there)", there.display()))
@@ -207,6 +211,19 @@ fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>> {
             Err(Error::input(folder, message))
         }
     }
+}
+
+/// The names of a folder's frames that are among `frames`, by their number.
+fn chosen(folder: &Path, frames: Option<&FrameList>) -> Result<Vec<String>> {
+    let mut names = frame_names(folder)?;
+    if let Some(frames) = frames {
+        let number = |name: &String| Path::new(name).file_stem()?.to_str()?.parse().ok();
+        names.retain(|name| number(name).is_some_and(|n| frames.has(n)));
+        if names.is_empty() {
+            return Err(Error::input(folder, format!("has none of the frames {frames}")));
+        }
+    }
+    Ok(names)
 }
 
 /// Names of the EXR files in a folder, sorted; at least one.
