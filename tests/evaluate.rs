@@ -173,3 +173,14 @@ fn wrong_requests_are_refused_before_anything_is_baked() {
     assert!(text.contains("bake-probes") && !text.contains("--for-path"), "ulr wants any texel: {text}");
     assert!(!f.at("out").exists());
 }
+
+#[test]
+fn a_reference_noisier_than_what_it_judges_is_a_warning() {
+    let f = Folder::new();
+    let size = "--size 24x16 --reference-spp 4";
+    let output = f.evaluate(&format!("{size} --variant three=path-trace,--spp=3 --variant four=path-trace,--spp=4"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("four has 4 samples a pixel, its reference 4") && said.contains("--reference-spp some 32"), "{said}");
+    assert!(!said.contains("three has"), "{said}");
+}

@@ -8,11 +8,12 @@ use super::option::Size;
 use super::settings::Settings;
 use super::variant::{self, Given, Variant, WHOLE};
 use super::views::{FrameList, views};
-use super::{Context, Outcome};
+use super::{Context, Outcome, Stage};
 use crate::base::clock::seconds;
 use crate::base::named::within;
 use crate::io::provenance::hash_file;
 use crate::io::{Provenance, atomic};
+use crate::method::path_trace;
 use crate::metric::evaluation::{Costs, Evaluation, MethodErrors, html, markdown};
 use crate::{Error, Result};
 use costs::execute;
@@ -108,10 +109,34 @@ impl Evaluate {
         self.output.join("frames").join(&variant.name)
     }
 
+    /// A reference that is as noisy as what it judges measures its own noise.
+    fn warn_of_noise(&self, cx: &Context, plan: &Plan) -> Result<()> {
+        let spp = self.settings.reference_spp;
+        if self.reference.is_some() {
+            return Ok(());
+        }
+        for (variant, planned) in self.variants.iter().zip(&plan.frames) {
+            let Stage::RenderPath(frames) = &planned.stage else { continue };
+            if let (method, Some(samples)) = frames.samples()?
+                && method == path_trace::METHOD.name
+                && samples >= spp
+            {
+                cx.listener.warn(&format!(
+                    "{} has {samples} samples a pixel, its reference {spp}: most of what is measured is the reference's noise; \
+                     give --reference-spp some {}",
+                    variant.name,
+                    samples.saturating_mul(8)
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// Bakes and renders what is missing, measures all, and writes tables and page.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         let clock = seconds();
         let plan = self.plan(cx)?;
+        self.warn_of_noise(cx, &plan)?;
         let world = cx.opaque_world(&self.scene)?;
         let views = views(cx, &world.scene, Some(&self.path), self.settings.size.map(|s| s.0), self.frames.as_ref())?;
         // Before hours of work.

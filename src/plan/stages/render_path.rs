@@ -198,6 +198,13 @@ impl RenderPath {
         self.resolve().map(|_| ())
     }
 
+    /// The method's name, and the samples that its frames have, where they have a number of them that is not left to a budget.
+    pub fn samples(&self) -> Result<(&'static str, Option<u32>)> {
+        let Resolved { method, parameters } = self.resolve()?;
+        let is_fixed = self.budget_ms.is_none() && self.match_time.is_none();
+        Ok((method.name, method.count(&parameters).filter(|_| is_fixed)))
+    }
+
     /// The texels of probes that its views want, where the method can say it; `None` elsewhere.
     pub fn served(&self, cameras: &[Camera]) -> Result<Option<Served>> {
         let Resolved { method, parameters } = self.resolve()?;
