@@ -168,7 +168,7 @@ fn inputs_from_another_scene_or_another_run_are_refused() {
     std::fs::write(f.at("scene.xml"), SCENE.replace("0.6, 0.5, 0.4", "0.6, 0.5, 0.3")).unwrap();
     let message = f.refusal(&render(""));
     assert!(message.contains("another scene") && message.contains("curvature.exr"), "{message}");
-    let message = f.refusal("render-path scene.xml --path path.json --size 32x18 --probes out/probes -o again");
+    let message = f.refusal("render-path scene.xml --path path.json --size 32x18 --method ulr --probes out/probes -o again");
     assert!(message.contains("another scene") && message.contains("set.json"), "{message}");
     let message = f.refusal("resmap scene.xml --probes out/probes.json -o out/resmap");
     assert!(message.contains("another scene") && message.contains("probes.json"), "{message}");

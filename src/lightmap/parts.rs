@@ -56,6 +56,9 @@ impl Folder {
 
     /// Deletes the folder's blocks, and the folder if nothing else is in it.
     pub fn remove(&self) -> Result<()> {
+        if self.path.is_dir() {
+            atomic::sweep(&self.path);
+        }
         let entries = match std::fs::read_dir(&self.path) {
             Ok(entries) => entries,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),

@@ -3,6 +3,7 @@
 use super::stages::{BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
 use super::{Context, Outcome, overwrite};
 use crate::Result;
+use crate::io::atomic;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -121,6 +122,7 @@ impl Stage {
     /// What it reads is not as it should be, or what it would write is an input, or a file of somebody else's.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         overwrite::refuse(self.output(), self.inputs().into_iter().chain(self.sources()))?;
+        atomic::sweep(self.output());
         with!(self, s => s.run(cx))
     }
 

@@ -137,6 +137,7 @@ impl Evaluate {
         let clock = seconds();
         let plan = self.plan(cx)?;
         self.warn_of_noise(cx, &plan)?;
+        atomic::sweep(&self.output);
         let world = cx.opaque_world(&self.scene)?;
         let views = views(cx, &world.scene, Some(&self.path), self.settings.size.map(|s| s.0), self.frames.as_ref())?;
         // Before hours of work.

@@ -73,14 +73,17 @@ impl BakeLightmap {
         let world = cx.opaque_world(&self.scene)?;
         let loaded = clock();
         let provenance = Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params);
+        let key = serde_json::to_string(&provenance).map_err(|e| Error::Request(e.to_string()))?;
+        let [first_store, store] = [".first.parts", ".parts"].map(|ending| Folder::new(&beside(&self.output, ending), &key));
         if is_finished(&self.output, &provenance) {
             touch(&self.output);
+            // Of a second run at the same time, or of one with other options that was killed.
+            first_store.remove()?;
+            store.remove()?;
             let summary = format!("{}: up to date", self.output.display());
             return Ok(Outcome { summary, figures: json!({ "up_to_date": true }), ..Outcome::default() });
         }
         let plan = Plan::new(&world, &params, cx.seed)?;
-        let key = serde_json::to_string(&provenance).map_err(|e| Error::Request(e.to_string()))?;
-        let [first_store, store] = [".first.parts", ".parts"].map(|ending| Folder::new(&beside(&self.output, ending), &key));
         let planned = clock() - loaded;
 
         let scene = cx.on_gpu(|gpu| GpuScene::new(gpu, &world))?;

@@ -77,6 +77,7 @@ impl Compare {
     /// Reads, measures and draws all frames.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
+        atomic::sweep(&self.output.join("images"));
         let pairs = pairs(&self.image, &self.reference, self.frames.as_ref())?;
         let progress = cx.progress();
         progress.start("compare", pairs.len() as u64);
