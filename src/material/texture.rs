@@ -40,6 +40,7 @@ pub struct Attribute {
 
 impl Attribute {
     /// Value at the barycentric weights of a triangle's second and third corner.
+    #[inline(never)]
     fn eval(&self, triangle: u32, barycentric: Vec2) -> Rgb {
         let Some(local) = triangle.checked_sub(self.first_triangle) else { return Rgb::ZERO };
         let value = |i: u32| self.values.get(i as usize).copied().unwrap_or(Rgb::ZERO);
@@ -88,7 +89,7 @@ impl Texture {
         match self {
             Self::Constant(c) => *c,
             Self::Bitmap(bitmap) => bitmap.eval(s.uv),
-            Self::Checkerboard { colors, to_uv } => colors[field(to_uv, s.uv)].at(s),
+            Self::Checkerboard { colors, to_uv } => within(colors, to_uv, s),
             Self::Attribute(attribute) => attribute.eval(s.triangle, s.barycentric),
         }
     }
@@ -127,6 +128,12 @@ impl Texture {
             }
         }
     }
+}
+
+/// A checkerboard's value. A function of its own, so that [`Texture::at`] does not call itself and can be put in where it is used.
+#[inline(never)]
+fn within(colors: &[Texture; 2], to_uv: &Affine2, s: &Surface) -> Rgb {
+    colors[field(to_uv, s.uv)].at(s)
 }
 
 /// Which colour of a checkerboard lies at `uv`.

@@ -101,7 +101,10 @@ impl Facet {
         }
     }
 
-    /// The place on `round`, which the triangle stands for, that `hit` means.
+    /// The place on `round`, which the triangle stands for, that `hit` means. Few scenes have any: kept out of line, as all that paths do
+    /// for round shapes, so that the way of triangles stays short.
+    #[cold]
+    #[inline(never)]
     pub fn surface_of(&self, round: &Round, hit: &Hit) -> Surface {
         let at = round.point(hit.triangle, hit.u, hit.v);
         let p = round.to_world.transform_point3(at.p).as_vec3();

@@ -315,6 +315,7 @@ impl Environment {
 }
 
 /// Irradiance that a delta emitter sends to a surface at `p` that faces it, as the `weight` of a sample.
+#[inline(never)]
 fn sample_delta(emitter: &Emitter, p: Vec3) -> Option<LightSample> {
     let (point, intensity, falloff) = match emitter {
         Emitter::Directional { direction, irradiance } => {

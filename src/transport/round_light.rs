@@ -55,6 +55,8 @@ pub(crate) fn bounds(round: &Round, mean: f32) -> LightBounds {
 }
 
 /// A direction from `p` to a lamp that is chosen with `probability`.
+#[cold]
+#[inline(never)]
 pub(crate) fn sample(round: &Round, radiance: &Texture, p: Vec3, probability: f32, v: Vec2) -> Option<LightSample> {
     let from = p.as_dvec3();
     let (x, y) = (f64::from(v.x), f64::from(v.y));
@@ -79,6 +81,8 @@ pub(crate) fn sample(round: &Round, radiance: &Texture, p: Vec3, probability: f3
 }
 
 /// Density by solid angle with which [`sample`] finds the point `at` of the lamp from `p`, its choice left out.
+#[cold]
+#[inline(never)]
 pub(crate) fn pdf(round: &Round, p: Vec3, at: Vec3) -> f32 {
     let (from, at) = (p.as_dvec3(), at.as_dvec3());
     let pdf = match (outside(round, p), (at - from).try_normalize()) {

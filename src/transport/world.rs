@@ -48,6 +48,7 @@ impl World {
     }
 
     /// First surface along a ray.
+    #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Surface> {
         self.closest(ray).map(|hit| self.surface(&hit))
     }
@@ -74,6 +75,7 @@ impl World {
     }
 
     /// The surface that a hit lies on.
+    #[inline]
     pub fn surface(&self, hit: &Hit) -> Surface {
         let facet = &self.facets[hit.triangle as usize];
         match facet.round(&self.scene.geometry) {

@@ -81,6 +81,7 @@ impl Bvh {
     }
 
     /// First hit in [t_min, t_max]. Alpha-masked triangles are passed where a hash of ray and triangle says so.
+    #[inline]
     pub fn closest(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
         let flat = self.closest_triangle(scene, ray);
         match &self.rounds {
@@ -102,6 +103,7 @@ impl Bvh {
     }
 
     /// Whether anything lies in [t_min, t_max].
+    #[inline]
     pub fn occluded(&self, scene: &Scene, ray: &Ray) -> bool {
         let by_round = |rounds: &RoundTree| rounds.occluded(scene, ray, &mut |hit| passes(scene, ray, hit));
         self.triangle_occludes(scene, ray) || self.rounds.as_ref().is_some_and(by_round)

@@ -29,6 +29,7 @@ impl RoundTree {
     }
 
     /// The closest hit that `passes` does not wave through, or `best` where that is nearer.
+    #[inline(never)]
     pub fn closest(&self, scene: &Scene, ray: &Ray, mut best: Option<Hit>, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
         let mut t_max = best.map_or(ray.t_max, |hit| hit.t);
         self.walk(scene, ray, &mut t_max, &mut |hit, t_max| {
@@ -43,6 +44,7 @@ impl RoundTree {
     }
 
     /// Whether there is any hit that `passes` does not wave through.
+    #[inline(never)]
     pub fn occluded(&self, scene: &Scene, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
         let mut found = false;
         self.walk(scene, ray, &mut ray.t_max.clone(), &mut |hit, t_max| {
