@@ -8,7 +8,7 @@ mod timing;
 use reprobe::method::glossy_probes::candidates::NearCandidates;
 use reprobe::method::glossy_probes::filter::FilterParams;
 use reprobe::method::glossy_probes::gather::{GatherParams, gather};
-use reprobe::method::glossy_probes::renderer::{filter_pass, nearest_probes};
+use reprobe::method::glossy_probes::renderer::filter_pass;
 use reprobe::probe::store::ProbeStore;
 use reprobe::scene::Camera;
 use reprobe::surface::curvature_file;
@@ -35,7 +35,10 @@ fn main() {
     let curvature = curvature.expect("curvatures of this scene");
     let camera = Camera { size, ..world.scene.sensor.clone().expect("a sensor") };
     let mut store = ProbeStore::<IgnoredAny>::open(Path::new(probes), &world.scene, usize::MAX).expect("probes of this scene");
-    let near: Vec<_> = nearest_probes(&store.set.grid, camera.position(), 8)
+    let near: Vec<_> = store
+        .set
+        .grid
+        .nearest(camera.position(), 8)
         .into_iter()
         .map(|(i, t)| (i, store.probe(i).expect("a probe"), GatherParams::default().probe_weight(t)))
         .collect();

@@ -2,7 +2,12 @@
 
 use crate::io::ExrImage;
 use crate::{Error, Result};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
+
+/// How an EXR file begins.
+const EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Refuses to write `output` where it is one of `inputs` (files or folders, by whatever name), or a file that is not a stage's.
 pub fn refuse<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
@@ -17,15 +22,18 @@ pub fn refuse<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) 
 }
 
 /// Whether a file is not a stage's output. One that was ours before something damaged it is not foreign, so that it can be made anew.
-fn is_foreign(file: &Path) -> Result<bool> {
-    let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
-    Ok(match bytes.first() {
-        None => false,
-        Some(b'{') => serde_json::from_slice::<serde_json::Value>(&bytes).is_ok_and(|value| value.get("provenance").is_none()),
-        Some(_) if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) => {
-            ExrImage::read_provenance(file).is_ok_and(|found| found.is_none())
+fn is_foreign(path: &Path) -> Result<bool> {
+    let fail = |e| Error::io(path, e);
+    let mut start = Vec::new();
+    File::open(path).map_err(fail)?.take(EXR.len() as u64).read_to_end(&mut start).map_err(fail)?;
+    Ok(match start.as_slice() {
+        [] => false,
+        [b'{', ..] => {
+            let bytes = std::fs::read(path).map_err(fail)?;
+            serde_json::from_slice::<serde_json::Value>(&bytes).is_ok_and(|value| value.get("provenance").is_none())
         }
-        Some(_) => true,
+        start if start == EXR => ExrImage::read_provenance(path).is_ok_and(|found| found.is_none()),
+        _ => true,
     })
 }
 

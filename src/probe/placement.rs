@@ -146,6 +146,22 @@ impl ProbeGrid {
         result
     }
 
+    /// The eight probes nearest an eye with their trilinear weights (§5.2), or the `count` of largest weight.
+    pub fn nearest(&self, eye: Vec3, count: usize) -> Vec<(usize, f32)> {
+        // At the border of the grid, and in a grid of one layer, corners coincide.
+        let mut merged: Vec<(usize, f32)> = Vec::with_capacity(8);
+        for ProbeWeight { probe, weight } in self.around(eye) {
+            match merged.iter_mut().find(|(i, _)| *i == probe) {
+                Some((_, w)) => *w += weight,
+                None if self.is_blocked(probe) => {}
+                None => merged.push((probe, weight)),
+            }
+        }
+        merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        merged.truncate(count.clamp(1, 8));
+        merged
+    }
+
     /// Writes `probes.json`.
     pub fn write(&self, path: &Path) -> Result<()> {
         atomic::write_json(path, self)

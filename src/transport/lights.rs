@@ -6,6 +6,7 @@
 //! normal, which Mitsuba replaces by the shading normal on smooth meshes.
 
 use super::envmap::Envmap;
+use super::light_sample::LightSample;
 use super::light_tree::{LightBounds, LightTree, Receiver};
 use super::round_light;
 use crate::base::math::{Rgb, luminance};
@@ -55,23 +56,6 @@ pub(crate) struct LightTriangle {
 pub(crate) enum Environment {
     Map(Envmap),
     Constant(Rgb),
-}
-
-/// A direction towards an emitter.
-#[derive(Debug, Clone, Copy)]
-pub struct LightSample {
-    /// Unit direction from the reference point.
-    pub wi: Vec3,
-    /// Distance to the emitter; infinite for environments.
-    pub distance: f32,
-    /// The emitting point; meaningless where the distance is infinite.
-    pub point: Vec3,
-    /// Radiance over pdf.
-    pub weight: Rgb,
-    /// Density in solid angle, emitter choice included; 1 for a delta emitter.
-    pub pdf: f32,
-    /// Whether no BSDF sample can find it (point, spot, directional).
-    pub delta: bool,
 }
 
 impl Lights {

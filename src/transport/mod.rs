@@ -4,6 +4,7 @@ pub mod bvh;
 pub mod envmap;
 pub mod facet;
 pub mod follow;
+pub mod light_sample;
 pub mod light_tree;
 pub mod lights;
 pub mod path;

@@ -5,8 +5,8 @@
 //! layers, each with the noise of a render of that layer alone; and the roulette's throughput leaves the first vertex's
 //! weight out, so that a weak lobe's layer is as well sampled as a strong one's.
 
+use super::light_sample::LightSample;
 use super::light_tree::Receiver;
-use super::lights::LightSample;
 use super::{Sampler, World};
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;

@@ -4,8 +4,8 @@
 //! an uneven scale has made it an ellipsoid, that is done in its own space, in which it is a sphere, and the density is carried over.
 //! From inside, and for cylinders and disks, points are drawn evenly by area.
 
+use super::light_sample::LightSample;
 use super::light_tree::LightBounds;
-use super::lights::LightSample;
 use crate::material::Texture;
 use crate::scene::Round;
 use crate::scene::round::{RoundKind, RoundPoint};

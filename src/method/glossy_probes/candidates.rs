@@ -1,6 +1,5 @@
 //! A probe's texels, made ready for the gather: what it reads most often lies closest together.
 
-use super::gather::WeightedProbe;
 use crate::base::math::Rgb;
 use crate::base::ray::Hit;
 use crate::material::bsdf::{Lobes, Query};
@@ -24,6 +23,18 @@ pub struct Candidates {
     pub directions: Vec<Directions>,
     /// What is fetched in the end.
     pub light: Vec<Light>,
+}
+
+/// A probe that takes part.
+pub struct WeightedProbe<'a> {
+    /// Index in the set.
+    pub index: usize,
+    /// The probe.
+    pub probe: &'a Probe,
+    /// Its texels, ready for the search.
+    pub candidates: &'a Candidates,
+    /// Its weight at equal energy ([`super::gather::GatherParams::probe_weight`]).
+    pub weight: f32,
 }
 
 /// The reflector's material, and what a mirror there shows.

@@ -5,7 +5,7 @@
 //!
 //! *Ours*: colour is fetched at the fractional coordinate, geometry at the texel that holds it.
 
-use super::candidates::Candidates;
+use super::candidates::WeightedProbe;
 use super::perturb::PerturbParams;
 use super::search::{MAX_RADIUS, Sample, TILE, best_samples, tiles};
 use crate::Result;
@@ -162,18 +162,6 @@ pub struct Gathered {
 impl Gathered {
     /// Nothing was found.
     pub const NONE: Self = Self { color: Rgb::ZERO, energy: f32::INFINITY, best: None };
-}
-
-/// A probe that takes part.
-pub struct WeightedProbe<'a> {
-    /// Index in the set.
-    pub index: usize,
-    /// The probe.
-    pub probe: &'a Probe,
-    /// Its texels, ready for the search.
-    pub candidates: &'a Candidates,
-    /// Its weight at equal energy ([`GatherParams::probe_weight`]).
-    pub weight: f32,
 }
 
 /// Gathers all pixels of a view from `probes` (§5.2). `reflected` holds the view's mirror hits, one a pixel.

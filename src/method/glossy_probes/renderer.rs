@@ -12,7 +12,6 @@ use crate::Result;
 use crate::base::clock::Clock;
 use crate::base::math::Rgb;
 use crate::lightmap::LightMap;
-use crate::probe::placement::{ProbeGrid, ProbeWeight};
 use crate::probe::store::ProbeStore;
 use crate::scene::Camera;
 use crate::surface::CurvatureMap;
@@ -108,7 +107,10 @@ impl<'a> Renderer<'a> {
         let size = fine.size.map(|s| s as usize);
         let mut clock = Clock::start();
 
-        let near: Vec<_> = nearest_probes(&probes.set.grid, camera.position(), self.params.gather.probes)
+        let near: Vec<_> = probes
+            .set
+            .grid
+            .nearest(camera.position(), self.params.gather.probes)
             .into_iter()
             .map(|(index, t)| Ok((index, probes.probe(index)?, self.params.gather.probe_weight(t))))
             .collect::<Result<_>>()?;
@@ -159,22 +161,6 @@ impl<'a> Renderer<'a> {
         let [emission, diffuse, glossy] = layers;
         Ok(Reprojected { emission, diffuse, glossy, passes: clock.laps, unserved, buffers })
     }
-}
-
-/// The eight probes nearest a camera with their trilinear weights (§5.2), or the `count` of largest weight.
-pub fn nearest_probes(grid: &ProbeGrid, eye: Vec3, count: usize) -> Vec<(usize, f32)> {
-    // At the border of the grid, and in a grid of one layer, corners coincide.
-    let mut merged: Vec<(usize, f32)> = Vec::with_capacity(8);
-    for ProbeWeight { probe, weight } in grid.around(eye) {
-        match merged.iter_mut().find(|(i, _)| *i == probe) {
-            Some((_, w)) => *w += weight,
-            None if grid.is_blocked(probe) => {}
-            None => merged.push((probe, weight)),
-        }
-    }
-    merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    merged.truncate(count.clamp(1, 8));
-    merged
 }
 
 /// Σ_I of every pixel (Eq. 3): what the probes' reduced roughness lacks, pixels².

@@ -2,7 +2,8 @@
 //!
 //! *Ours*: one pixel in so many each way, an anchor, is searched for in full; those between begin where it ended.
 
-use super::gather::{GatherParams, SearchLevel, WeightedProbe};
+use super::candidates::WeightedProbe;
+use super::gather::{GatherParams, SearchLevel};
 use super::perturb::Perturbation;
 use crate::base::math::floor;
 use crate::view::gbuffer::{GBuffer, Pixel};

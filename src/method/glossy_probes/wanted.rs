@@ -6,7 +6,6 @@
 use super::bake::probe_geometry;
 use super::candidates::NearCandidates;
 use super::gather::{GatherParams, footprint_texels};
-use super::renderer::nearest_probes;
 use super::search::{best_samples, tiles};
 use crate::Result;
 use crate::base::progress::Progress;
@@ -111,7 +110,7 @@ pub fn wanted_texels(
     progress.start("texels that the views use", cameras.len() as u64);
     for camera in cameras {
         let most = views.choices().map(|gather| gather.probes).max().unwrap_or(1);
-        let near = nearest_probes(grid, camera.position(), most);
+        let near = grid.nearest(camera.position(), most);
         probes.retain(|index, _| near.iter().any(|(i, _)| i == index));
         for &(index, _) in &near {
             if let Entry::Vacant(entry) = probes.entry(index) {

@@ -12,7 +12,7 @@ pub(crate) mod probes;
 use super::GlossyProbeParams;
 use super::candidates::Candidates;
 use super::gather::Gathered;
-use super::renderer::{Buffers, Reprojected, nearest_probes};
+use super::renderer::{Buffers, Reprojected};
 use super::wanted::Served;
 use crate::Result;
 use crate::base::clock::Clock;
@@ -214,7 +214,7 @@ impl<'a> Renderer<'a> {
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
         let upload = |probe: &Probe| GpuProbe::upload(gpu, probe, &Candidates::new(self.world, probe, albedos, mirrors));
-        for (index, t_i) in nearest_probes(&probes.set.grid, eye, params.gather.probes) {
+        for (index, t_i) in probes.set.grid.nearest(eye, params.gather.probes) {
             clock.restart();
             let probe = probes.probe(index)?;
             let there = self.resident.get(gpu, index, probes::bytes(&probe), || upload(&probe))?;
@@ -235,7 +235,7 @@ impl<'a> Renderer<'a> {
         }
         clock.restart();
         if let Some(next) = next {
-            let wanted = nearest_probes(&probes.set.grid, next.position(), params.gather.probes);
+            let wanted = probes.set.grid.nearest(next.position(), params.gather.probes);
             upload_ahead((gpu, &mut self.resident), probes, &wanted, upload)?;
         }
         clock.lap("load");
