@@ -57,13 +57,6 @@ pub fn sweep(output: &Path) {
     }
 }
 
-/// [`write`] of indented JSON with a final newline.
-pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
-    let mut text = serde_json::to_string_pretty(value).map_err(|e| Error::input(path, e.to_string()))?;
-    text.push('\n');
-    write(path, text.as_bytes())
-}
-
 #[cfg(all(test, unix))]
 mod tests {
     use std::os::unix::fs::PermissionsExt;

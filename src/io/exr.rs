@@ -1,7 +1,7 @@
 //! EXR images of named channels, with provenance.
 
 use super::subsampled::{self, Subsampled};
-use super::{Provenance, atomic, primaries};
+use super::{Provenance, atomic, primaries, seal};
 use crate::base::math::Rgb;
 use crate::{Error, Result};
 use exr::prelude as e;
@@ -181,7 +181,7 @@ impl ExrImage {
         let mut attributes = e::LayerAttributes::default();
         if let Some(p) = &self.provenance {
             // One attribute only: the crate keeps them in a hash map, whose order would differ from run to run.
-            let text = serde_json::to_string(p).map_err(|err| Error::input(path, err.to_string()))?;
+            let text = seal::blank(&serde_json::to_string(p).map_err(|err| Error::input(path, err.to_string()))?);
             attributes.other.insert("provenance".into(), e::AttributeValue::Text(text.as_str().into()));
         }
         let encoding = e::Encoding { compression, blocks: e::Blocks::ScanLines, line_order: e::LineOrder::Increasing };
@@ -191,7 +191,9 @@ impl ExrImage {
             .write()
             .to_buffered(&mut bytes)
             .map_err(|err| Error::input(path, format!("cannot be encoded: {err}")))?;
-        Ok(bytes.into_inner())
+        let mut bytes = bytes.into_inner();
+        seal::seal(&mut bytes);
+        Ok(bytes)
     }
 
     /// Reads a file written by [`ExrImage::write`], or any flat EXR file.
@@ -208,8 +210,16 @@ impl ExrImage {
         meta.headers.first().map_or(Ok(None), |h| provenance(path, &h.own_attributes))
     }
 
+    /// The provenance of a file that is as we wrote it, to its last byte; `None` for any other.
+    pub fn provenance_of_whole(bytes: &[u8]) -> Option<Provenance> {
+        let meta = || exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), true).ok();
+        let is_whole = seal::holds(bytes) == Some(true);
+        provenance(Path::new(""), &is_whole.then(meta)??.headers.first()?.own_attributes).ok()?
+    }
+
     /// Reads the bytes of an EXR file; `path` is for messages.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
+        seal::check(path, bytes)?;
         let bad = |err: exr::error::Error| Error::input(path, format!("not a readable EXR file: {err}"));
         let matrix = |primaries: [[f32; 2]; 4]| {
             primaries::to_rec709(primaries).map_err(|m| Error::input(path, format!("attribute \"chromaticities\": {m}")))
@@ -290,7 +300,33 @@ mod tests {
         assert_eq!(ExrImage::read_provenance(&path).unwrap(), image.provenance);
         image.write_uncompressed(&path).unwrap();
         assert_eq!(ExrImage::read(&path).unwrap(), image);
+        assert_eq!(ExrImage::provenance_of_whole(&std::fs::read(&path).unwrap()), image.provenance);
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file stays behind");
+    }
+
+    #[test]
+    fn any_changed_byte_is_found() {
+        let path = Path::new("a.exr");
+        let image = ExrImage::new(4, 3)
+            .with_f32("a", (0..12).map(|i| i as f32 * 0.1).collect())
+            .with_provenance(Provenance::new("test", "abc", 7, &serde_json::json!({"x": 1})));
+        for compression in [e::Compression::ZIP16, e::Compression::Uncompressed] {
+            let whole = image.to_bytes(path, compression).unwrap();
+            assert_eq!(ExrImage::from_bytes(path, &whole).unwrap(), image);
+            for at in 0..whole.len() {
+                let mut bytes = whole.clone();
+                bytes[at] ^= 4;
+                assert_eq!(ExrImage::provenance_of_whole(&bytes), None, "byte {at}");
+                // Where it is taken for somebody else's file, it has the same pixels, or is no image.
+                if let Ok(read) = ExrImage::from_bytes(path, &bytes) {
+                    assert_eq!(read.channels, image.channels, "byte {at}");
+                }
+            }
+            for length in 0..whole.len() {
+                assert_eq!(ExrImage::provenance_of_whole(&whole[..length]), None, "cut at {length}");
+                assert!(ExrImage::from_bytes(path, &whole[..length]).is_err(), "cut at {length}");
+            }
+        }
     }
 
     #[test]

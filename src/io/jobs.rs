@@ -50,9 +50,9 @@ pub struct Done {
     pub missing: usize,
 }
 
-/// Whether an earlier run with the same inputs and parameters finished this file.
+/// Whether an earlier run with the same inputs and parameters finished this file, and nothing has changed it since.
 pub fn is_finished(file: &Path, provenance: &Provenance) -> bool {
-    ExrImage::read_provenance(file).is_ok_and(|found| found.as_ref() == Some(provenance))
+    std::fs::read(file).is_ok_and(|bytes| ExrImage::provenance_of_whole(&bytes).as_ref() == Some(provenance))
 }
 
 /// Makes a file that is up to date as new as if it were written now, so that make does not ask for it again. Where that is not

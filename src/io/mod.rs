@@ -1,14 +1,17 @@
-//! Files: EXR layers, atomic writes, provenance.
+//! Files: EXR layers, JSON, atomic writes, provenance, checksums.
 
 pub mod atomic;
 pub mod exr;
 pub mod jobs;
+pub mod json;
 pub mod picture;
 pub mod primaries;
 pub mod provenance;
+mod seal;
 mod subsampled;
 mod text;
 
 pub use exr::{ExrImage, Samples};
 pub use provenance::Provenance;
+pub use seal::{HEAD, is_sealed};
 pub use text::read_text;

@@ -50,7 +50,7 @@ fn mean_ms(folder: &Path, cx: &Context) -> Result<f64> {
     let path = folder.join("timings.json");
     let text =
         std::fs::read_to_string(&path).map_err(|e| Error::input(&path, format!("{e}: --match-time needs a folder of frames")))?;
-    let other: Other = serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
+    let other: Other = crate::io::json::parse(&path, &text)?;
     let threads = rayon::current_num_threads();
     if other.threads != threads {
         cx.listener.warn(&format!("{}: timed with {} threads; this run has {threads}", path.display(), other.threads));

@@ -7,7 +7,7 @@ use crate::Result;
 use crate::base::clock::timed;
 use crate::base::progress::Silent;
 use crate::io::jobs::is_finished;
-use crate::io::{ExrImage, Provenance, atomic};
+use crate::io::{ExrImage, Provenance, json};
 use crate::method::{Frame, Method, Renderer, Setup};
 use crate::scene::Camera;
 use crate::scene::camera::ALL_DEPTHS;
@@ -44,7 +44,7 @@ pub fn render(frames: &Frames, cx: &Context, mut timings: Timings) -> Result<Out
         let renderer = made(&mut renderer, frames, &mut timings)?;
         timings.samples = Some(choose_samples(frames.setup.views, renderer, budget)?);
         // Before the frames are rendered with it, so that a run that is stopped can be repeated.
-        atomic::write_json(&frames.output.join("timings.json"), &timings)?;
+        json::write(&frames.output.join("timings.json"), &timings)?;
     }
     let samples = timings.samples.unwrap_or(1);
     let parameters = frames.method.with_samples(frames.setup.parameters, samples);
@@ -168,7 +168,7 @@ fn describe(camera: &Camera) -> Value {
 /// Writes `timings.json` and sums up the run.
 fn finish(mut timings: Timings, output: &Path) -> Result<Outcome> {
     timings.finish(&output.join("timings.json"));
-    atomic::write_json(&output.join("timings.json"), &timings)?;
+    json::write(&output.join("timings.json"), &timings)?;
     let kept = timings.frames.iter().filter(|f| f.kept).count();
     let count = timings.frames.len();
     let mean: f64 = timings.mean_ms.values().sum();

@@ -1,6 +1,6 @@
 //! Outputs that would destroy something: an input of the same command, or a file that no stage wrote.
 
-use crate::io::ExrImage;
+use crate::io::{ExrImage, HEAD, is_sealed};
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::Read;
@@ -25,14 +25,15 @@ pub fn refuse<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) 
 fn is_foreign(path: &Path) -> Result<bool> {
     let fail = |e| Error::io(path, e);
     let mut start = Vec::new();
-    File::open(path).map_err(fail)?.take(EXR.len() as u64).read_to_end(&mut start).map_err(fail)?;
+    File::open(path).map_err(fail)?.take(HEAD as u64).read_to_end(&mut start).map_err(fail)?;
     Ok(match start.as_slice() {
-        [] => false,
+        // Nothing, or what a crash of the machine left of it.
+        start if start.iter().all(|&byte| byte == 0) || is_sealed(start) => false,
         [b'{', ..] => {
             let bytes = std::fs::read(path).map_err(fail)?;
             serde_json::from_slice::<serde_json::Value>(&bytes).is_ok_and(|value| value.get("provenance").is_none())
         }
-        start if start == EXR => ExrImage::read_provenance(path).is_ok_and(|found| found.is_none()),
+        start if start.starts_with(&EXR) => ExrImage::read_provenance(path).is_ok_and(|found| found.is_none()),
         _ => true,
     })
 }
@@ -40,7 +41,7 @@ fn is_foreign(path: &Path) -> Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::{Provenance, Samples};
+    use crate::io::{Provenance, Samples, json};
 
     #[test]
     fn inputs_and_other_peoples_files_are_refused() {
@@ -58,11 +59,14 @@ mod tests {
         ours.write(&at("ours.exr")).unwrap();
         picture(None).write(&at("photograph.exr")).unwrap();
         let whole = std::fs::read(at("ours.exr")).unwrap();
+        json::write(&at("probes.json"), &serde_json::json!({"provenance": {}})).unwrap();
+        let sealed = std::fs::read_to_string(at("probes.json")).unwrap();
         let none: [&PathBuf; 0] = [];
         for kept in [
             file("vase.obj", b"v 0 0 0\n"),
             file("path.json", br#"{"frames": []}"#),
             file("list.json", b"[]"),
+            file("parcels.json", br#"{"checksum": "crc32"}"#),
             at("photograph.exr"),
         ] {
             assert!(refuse(&kept, none).unwrap_err().to_string().contains("not written by reprobe"), "{}", kept.display());
@@ -72,7 +76,11 @@ mod tests {
             at("ours.exr"),
             file("cut.exr", &whole[..whole.len() / 2]),
             file("empty.exr", b""),
-            file("probes.json", br#"{"provenance": {}}"#),
+            file("zeros.exr", &[0; 100]),
+            file("flipped.exr", &[&[whole[0] ^ 1], &whole[1..]].concat()),
+            file("flipped.json", sealed.replace("provenance", "pzovenance").as_bytes()),
+            file("beheaded.json", sealed.replace('{', "y").as_bytes()),
+            at("probes.json"),
             file("cut.json", br#"{"prov"#),
             folder.path().to_owned(),
         ] {

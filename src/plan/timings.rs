@@ -71,7 +71,7 @@ impl Timings {
 
     /// Reads what [`Timings::finish`] led to; `None` where there is no such file.
     pub fn read(path: &Path) -> Option<Self> {
-        serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()
+        crate::io::json::parse(path, &std::fs::read_to_string(path).ok()?).ok()
     }
 
     /// Fills in the means and the memory; frames that were kept have the times that the `earlier` file tells of them.

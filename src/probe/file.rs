@@ -217,7 +217,6 @@ impl Probe {
 /// `set.json` of a probe folder: written last, so its presence says that the set is whole. `Served` says which views a set that does not
 /// hold every texel is for, in the words of the method that it was baked for; [`serde::de::IgnoredAny`] for a reader that does not ask.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct BakedSet<Served> {
     /// Where the probes stand.
     pub grid: crate::probe::placement::ProbeGrid,

@@ -4,7 +4,7 @@
 //! middle of each, so that none lies in a wall that bounds the box; probes that no line of sight connects with a camera
 //! (those inside objects or behind walls) are marked as blocked, and take no part in the interpolation.
 
-use crate::io::{Provenance, atomic};
+use crate::io::{Provenance, json};
 use crate::{Error, Result};
 use glam::{UVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -34,7 +34,6 @@ impl Default for Density {
 
 /// A regular grid of probes: the content of `probes.json`. Index order: x fastest, then y, then z.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct ProbeGrid {
     /// Position of probe 0, the one at the lowest x, y and z, metres.
     pub origin: [f32; 3],
@@ -164,13 +163,13 @@ impl ProbeGrid {
 
     /// Writes `probes.json`.
     pub fn write(&self, path: &Path) -> Result<()> {
-        atomic::write_json(path, self)
+        json::write(path, self)
     }
 
     /// Reads `probes.json`.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-        let grid: Self = serde_json::from_str(&text).map_err(|e| Error::at_line(path, e.line() as u32, e.to_string()))?;
+        let grid: Self = json::parse(path, &text)?;
         grid.check().map_err(|message| Error::input(path, message))?;
         Ok(grid)
     }

@@ -1,13 +1,12 @@
 //! `set.json`: written last into a folder of numbered files, so that its presence says that the folder is complete.
 
-use crate::io::{Provenance, atomic};
+use crate::io::{Provenance, json};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// What a folder of `NNNN.exr` files holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct ProbeSet {
     /// Number of files, 0000 to count − 1.
     pub count: usize,
@@ -25,7 +24,7 @@ impl ProbeSet {
 
     /// Marks `folder` as complete.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        atomic::write_json(&Self::path(folder), self)
+        json::write(&Self::path(folder), self)
     }
 
     /// Reads what a complete folder holds. `stage` is the subcommand that should have written it.
@@ -37,7 +36,7 @@ impl ProbeSet {
             }
             _ => Error::io(&path, e),
         })?;
-        let set: Self = serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
+        let set: Self = json::parse(&path, &text)?;
         if set.provenance.stage != stage {
             return Err(Error::input(&path, format!("written by {}, expected {stage}", set.provenance.stage)));
         }

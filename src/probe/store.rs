@@ -2,7 +2,7 @@
 
 use super::file::{BakedSet, Probe};
 use super::parameter_map::{ParameterMap, map_paths};
-use crate::io::{ExrImage, atomic};
+use crate::io::{ExrImage, json};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::Vec3;
@@ -34,8 +34,7 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
     pub fn open(folder: &Path, scene: &Scene, capacity: usize) -> Result<Self> {
         let path = folder.join(SET_FILE);
         let text = read_set(folder)?;
-        let set: BakedSet<Served> =
-            serde_json::from_str(&text).map_err(|e| Error::at_line(&path, e.line() as u32, e.to_string()))?;
+        let set: BakedSet<Served> = json::parse(&path, &text)?;
         set.provenance.check_scene(&path, &scene.hash)?;
         if set.files.len() != set.grid.len() {
             return Err(Error::input(&path, format!("{} files for {} probes", set.files.len(), set.grid.len())));
@@ -77,8 +76,8 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
                 "was not baked: the set serves the views of one camera path; bake it again for these",
             ));
         }
-        let image = ExrImage::read(&path)?;
-        let map = ParameterMap::from_images((&forward, &ExrImage::read(&forward)?), (&path, &image))?.without_inverse();
+        let [forward_image, image] = [self.member(&forward)?, self.member(&path)?];
+        let map = ParameterMap::from_images((&forward, &forward_image), (&path, &image))?.without_inverse();
         let [width, height] = self.set.size.map(|s| s as usize);
         if (image.width, image.height) != (width, height) {
             let message = format!("{} x {} texels, but {SET_FILE} says {width} x {height}", image.width, image.height);
@@ -86,6 +85,15 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
         }
         let position: Vec3 = self.set.grid.position(index);
         Probe::from_image(&path, &image, map, position, self.triangles, self.materials)
+    }
+
+    /// A file of the set; an error where it is of another one.
+    fn member(&self, path: &Path) -> Result<ExrImage> {
+        let image = ExrImage::read(path)?;
+        if image.provenance(path)? != &self.set.provenance {
+            return Err(Error::input(path, format!("from another run than its {SET_FILE} says; run bake-probes again")));
+        }
+        Ok(image)
     }
 
     /// Bytes of the probes in memory.
@@ -111,5 +119,5 @@ pub fn set_hash(folder: &Path) -> Result<String> {
 
 /// Writes `set.json`: the last step of a bake.
 pub fn write_set(folder: &Path, set: &BakedSet<impl Serialize>) -> Result<()> {
-    atomic::write_json(&folder.join(SET_FILE), set)
+    json::write(&folder.join(SET_FILE), set)
 }

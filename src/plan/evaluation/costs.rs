@@ -4,7 +4,7 @@ use super::Evaluate;
 use super::plan::{Plan, Planned};
 use crate::Result;
 use crate::base::clock::seconds;
-use crate::io::atomic;
+use crate::io::json;
 use crate::method::glossy_probes::wanted::Served;
 use crate::metric::evaluation::{Costs, MethodCost, ProbeCost, StageCost};
 use crate::plan::timings::{Timings, frame_ms, is_rendering};
@@ -17,7 +17,7 @@ use std::path::Path;
 /// Runs all stages; what they took is added to what earlier runs have noted in `timings.json`.
 pub fn execute(of: &Evaluate, cx: &Context, plan: &Plan, scene: &Scene) -> Result<Costs> {
     let file = of.output.join("timings.json");
-    let earlier: Costs = std::fs::read_to_string(&file).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
+    let earlier: Costs = std::fs::read_to_string(&file).ok().and_then(|t| json::parse(&file, &t).ok()).unwrap_or_default();
     let total = plan.stages().count();
     let mut costs = Costs::default();
     for (i, Planned { stage, seed, users }) in plan.stages().enumerate() {
@@ -34,7 +34,7 @@ pub fn execute(of: &Evaluate, cx: &Context, plan: &Plan, scene: &Scene) -> Resul
             let mut noted = Costs { methods: earlier.methods.clone(), ..costs.clone() };
             let is_new = |s: &&StageCost| costs.stages.iter().all(|c| c.command != s.command);
             noted.stages.extend(earlier.stages.iter().filter(is_new).cloned());
-            atomic::write_json(&file, &noted)?;
+            json::write(&file, &noted)?;
         }
     }
     for (i, (variant, planned)) in of.variants.iter().zip(&plan.frames).enumerate() {
@@ -42,7 +42,7 @@ pub fn execute(of: &Evaluate, cx: &Context, plan: &Plan, scene: &Scene) -> Resul
         let cost = method_cost(planned.stage.output(), probes, &variant.name, &costs, scene);
         costs.methods.insert(variant.name.clone(), cost);
     }
-    atomic::write_json(&file, &costs)?;
+    json::write(&file, &costs)?;
     Ok(costs)
 }
 

@@ -12,7 +12,7 @@ use super::{Context, Outcome, Stage};
 use crate::base::clock::seconds;
 use crate::base::named::within;
 use crate::io::provenance::hash_file;
-use crate::io::{Provenance, atomic};
+use crate::io::{Provenance, atomic, json};
 use crate::method::path_trace;
 use crate::metric::evaluation::{Costs, Evaluation, MethodErrors, html, markdown};
 use crate::{Error, Result};
@@ -161,7 +161,7 @@ impl Evaluate {
         let layers = layers(&subjects)?;
         let measured = measure(&subjects, &layers, cx.progress())?;
         let evaluation = self.evaluation(cx, &world.scene.hash, &frames, size, &layers, measured.errors)?;
-        atomic::write_json(&self.output.join("evaluation.json"), &evaluation)?;
+        json::write(&self.output.join("evaluation.json"), &evaluation)?;
         atomic::write(&self.output.join("evaluation.md"), markdown(&evaluation, &costs).as_bytes())?;
         let page = self.output.join("index.html");
         atomic::write(&page, html(&evaluation, &costs, &measured.shown)?.as_bytes())?;

@@ -20,12 +20,13 @@ use crate::probe::parameter_map::{ParameterMap, map_paths};
 use crate::probe::placement::ProbeGrid;
 use crate::probe::set::{ProbeSet, numbered};
 use crate::probe::store::{ProbeStore, write_set};
-use crate::scene::Camera;
+use crate::scene::{Camera, Scene};
 use crate::surface::curvature_file;
 use crate::transport::World;
 use crate::transport::follow::Follow;
 use crate::transport::path::PathParams;
 use crate::{Error, Result};
+use rayon::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -169,7 +170,7 @@ impl BakeProbes {
         if let Some(file) = &self.lightmap {
             provenance = provenance.with_input("lightmap", hash_file(file)?);
         }
-        if ProbeStore::<Served>::open(&self.output, scene, 0).is_ok_and(|found| found.set.provenance == provenance) {
+        if self.is_up_to_date(scene, &provenance) {
             touch(&ProbeSet::path(&self.output));
             let summary = format!("{}: up to date", self.output.display());
             return Ok(Outcome { summary, figures: json!({ "baked": 0, "up_to_date": true }), ..Outcome::default() });
@@ -180,6 +181,19 @@ impl BakeProbes {
         };
         let (done, traced, device) = self.bake(cx, &inputs, &params, wanted.as_ref(), served, &provenance)?;
         Ok(self.outcome(&params, done, traced, &device, clock()))
+    }
+
+    /// Whether the set is there, and every file of it whole.
+    fn is_up_to_date(&self, scene: &Scene, provenance: &Provenance) -> bool {
+        let Ok(ProbeStore { set, .. }) = ProbeStore::<Served>::open(&self.output, scene, 0) else { return false };
+        let is_whole = |(i, hash): (usize, &String)| {
+            hash.is_empty() || self.has_finished(i, provenance) && hash_file(&numbered(&self.output, i)).is_ok_and(|h| h == *hash)
+        };
+        set.provenance == *provenance && set.files.par_iter().enumerate().all(is_whole)
+    }
+
+    fn has_finished(&self, probe: usize, provenance: &Provenance) -> bool {
+        map_paths(&self.output, probe).iter().all(|file| is_finished(file, provenance))
     }
 
     fn wanted(&self, cx: &Context, inputs: &Inputs, cameras: &[Camera], served: &Served) -> Result<Wanted> {
@@ -229,7 +243,7 @@ impl BakeProbes {
             cx.progress().finish();
             Ok(())
         };
-        let is_kept = |i| is_finished(&numbered(&self.output, i), provenance);
+        let is_kept = |i| self.has_finished(i, provenance);
         let seal = || {
             let hash =
                 |i| if needed.binary_search(&i).is_ok() { hash_file(&numbered(&self.output, i)) } else { Ok(String::new()) };

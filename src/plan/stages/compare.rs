@@ -2,7 +2,7 @@
 
 use crate::base::named::within;
 use crate::io::provenance::hash_file;
-use crate::io::{ExrImage, Provenance, atomic};
+use crate::io::{ExrImage, Provenance, atomic, json};
 use crate::metric::report::{FrameMetrics, Picture, Report};
 use crate::metric::without_noise::without_noise;
 use crate::metric::{Metrics, Raster, compare, ssim};
@@ -104,7 +104,7 @@ impl Compare {
         let [a, b] = [&self.image, &self.reference].map(|p| p.display().to_string());
         let page = self.output.join("index.html");
         atomic::write(&page, report.html([&a, &b])?.as_bytes())?;
-        atomic::write_json(&self.output.join("metrics.json"), &report)?;
+        json::write(&self.output.join("metrics.json"), &report)?;
         Ok(self.outcome(&report, &page))
     }
 

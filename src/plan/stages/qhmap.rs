@@ -10,6 +10,7 @@ use crate::method::glossy_probes::quasi_harmonic::Solver;
 use crate::method::glossy_probes::resmap::{density_correlation, read_m};
 use crate::plan::option::{Size, stage};
 use crate::plan::{Context, Outcome};
+use crate::probe::parameter_map::map_paths;
 use crate::probe::set::{ProbeSet, numbered};
 use crate::{Error, Result};
 use serde_json::json;
@@ -86,7 +87,8 @@ impl Qhmap {
             }
             map.save(&self.output, i, &set.provenance)
         };
-        let Done { kept, .. } = fill(&self.output, &set, cx.progress(), || Solver::new(from.size), make)?;
+        let files = |i| map_paths(&self.output, i).to_vec();
+        let Done { kept, .. } = fill(&self.output, &set, files, cx.progress(), || Solver::new(from.size), make)?;
         Ok(self.outcome(&set, kept, tally.into_inner().unwrap_or_else(PoisonError::into_inner), clock()))
     }
 

@@ -97,7 +97,8 @@ impl Resmap {
             glossy.fetch_add(map.m_mat.iter().filter(|m| **m > 0.0).count() as u64, Ordering::Relaxed);
             map.image(&seen).with_provenance(set.provenance.clone()).write_uncompressed(&numbered(&self.output, i))
         };
-        let Done { kept, .. } = fill(&self.output, &set, cx.progress(), || Ok(()), make)?;
+        let files = |i| vec![numbered(&self.output, i)];
+        let Done { kept, .. } = fill(&self.output, &set, files, cx.progress(), || Ok(()), make)?;
         let device = tracer.as_ref().map_or("cpu", |t| t.device());
         // None where all maps were kept from before.
         let (texels, glossy) = (texels.into_inner(), glossy.into_inner());

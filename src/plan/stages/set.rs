@@ -3,16 +3,17 @@
 use crate::Result;
 use crate::base::progress::Progress;
 use crate::io::jobs::{Done, complete, is_finished, touch};
-use crate::probe::set::{ProbeSet, numbered};
+use crate::probe::set::ProbeSet;
 use rayon::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Makes all files of `set` that `folder` does not hold yet, by `make(state, index)`, and then marks it as complete.
+/// Makes all items of `set` whose `files` are not all in `folder`, whole, by `make(state, index)`, and then marks it as complete.
 /// Each thread takes a state that nobody else uses, made by `state` when there is none.
 pub fn fill<S: Send>(
     folder: &Path,
     set: &ProbeSet,
+    files: impl Fn(usize) -> Vec<PathBuf> + Sync,
     progress: &dyn Progress,
     state: impl Fn() -> Result<S> + Sync,
     make: impl Fn(&mut S, usize) -> Result<()> + Sync,
@@ -20,10 +21,7 @@ pub fn fill<S: Send>(
     let stage = &set.provenance.stage;
     let sealed = set.is_complete_or_unmark(folder, stage)?;
     let items: Vec<usize> = (0..set.count).collect();
-    let is_kept = |i| match numbered(folder, i) {
-        file if sealed => file.is_file(),
-        file => is_finished(&file, &set.provenance),
-    };
+    let is_kept = |i| files(i).iter().all(|file| is_finished(file, &set.provenance));
     let states = Mutex::new(Vec::new());
     let make_all = |todo: &[usize]| {
         progress.start(stage, todo.len() as u64);
