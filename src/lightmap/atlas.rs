@@ -76,13 +76,18 @@ impl Atlas {
         let mut charts = cut(geometry, &adjacencies, area, texel)?;
         for _ in 0..MORE_TRIES {
             // Charts are whole texels wide, which counts where they are small.
-            let excess =
-                charts.iter().map(|c| f64::from(c.size[0]) * f64::from(c.size[1])).sum::<f64>() / f64::from(params.budget);
+            let texels = texels_of(&charts);
+            let excess = texels / f64::from(params.budget);
             if params.texel.is_some() || excess < 1.25 {
                 break;
             }
-            texel = two_digits(f64::from(texel) * excess.sqrt());
-            charts = cut(geometry, &adjacencies, area, texel)?;
+            let larger = two_digits(f64::from(texel) * excess.sqrt());
+            let fewer = cut(geometry, &adjacencies, area, larger)?;
+            if texels_of(&fewer) > 0.9 * texels {
+                // As small as they get: larger texels would only be emptier.
+                break;
+            }
+            (texel, charts) = (larger, fewer);
         }
         let size = place(&mut charts, texel)?;
         let mut triangle_chart = vec![NONE; geometry.triangles.len()];
@@ -100,6 +105,11 @@ impl Atlas {
         let chart = self.charts.get(self.triangle_chart[triangle as usize] as usize)?;
         Some(geometry.corners(triangle).map(|p| chart.project(p)))
     }
+}
+
+/// How many texels charts take.
+fn texels_of(charts: &[Chart]) -> f64 {
+    charts.iter().map(|c| f64::from(c.size[0]) * f64::from(c.size[1])).sum()
 }
 
 /// The texel's edge: as given, or what spends the budget, rounded up to two digits.
@@ -279,6 +289,10 @@ mod tests {
         testing::quad(&mut geometry, Vec3::ZERO, Vec3::X * 10.0, Vec3::Y * 10.0);
         let atlas = Atlas::build(&geometry, &|_| true, &AtlasParams { texel: None, budget: 10_000 }).unwrap();
         assert_eq!(atlas.texel, 0.1);
+        // The least that there is: one chart of one texel, filled by the wall.
+        let atlas = Atlas::build(&geometry, &|_| true, &AtlasParams { texel: None, budget: 1 }).unwrap();
+        let texels = crate::lightmap::texels::Texels::new(&geometry, &atlas);
+        assert!(!texels.is_empty() && atlas.texel < 100.0, "{} texels of {} m", texels.len(), atlas.texel);
         for texel in [1e-4, 1e-30, 0.0, -1.0, f32::NAN] {
             let params = AtlasParams { texel: Some(texel), budget: 0 };
             assert!(Atlas::build(&geometry, &|_| true, &params).unwrap_err().to_string().contains("--texel"));

@@ -1,9 +1,11 @@
 //! What all stages of a run share: options that every stage has, the scene, and who listens.
 
+use crate::base::clock::seconds;
 use crate::base::progress::{Progress, Silent};
 use crate::exchange::{LoadOptions, load};
 use crate::gpu::{Choice, Gpu};
 use crate::scene::Scene;
+use crate::scene::summary::Summary;
 use crate::transport::World;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -15,12 +17,15 @@ pub trait Listener: Progress + Send + Sync {
     fn warn(&self, message: &str);
     /// What is done next, or was done.
     fn say(&self, line: &str);
+    /// What only those want to know who ask for more (`-v`).
+    fn detail(&self, line: &str);
 }
 
 /// Hears nothing.
 impl Listener for Silent {
     fn warn(&self, _: &str) {}
     fn say(&self, _: &str) {}
+    fn detail(&self, _: &str) {}
 }
 
 /// Depth from which on what longer paths carry is not worth a word.
@@ -97,8 +102,11 @@ impl Context {
 
     /// Loads a scene and tells its warnings.
     pub fn load_scene(&self, path: &Path) -> Result<Scene> {
+        let clock = seconds();
         let scene = load(path, &self.load)?;
         scene.warnings.iter().for_each(|w| self.listener.warn(w));
+        let summary = Summary::of(&scene).to_string().replace('\n', "; ");
+        self.listener.detail(&format!("{}: {summary}; loaded in {:.2} s", path.display(), clock()));
         Ok(scene)
     }
 
@@ -110,7 +118,9 @@ impl Context {
         }
         let scene = self.load_scene(path)?;
         warn_of_bakes(&scene, &*self.listener);
+        let clock = seconds();
         let (world, left_out) = World::opaque(scene);
+        self.listener.detail(&format!("tree for rays built in {:.2} s", clock()));
         if left_out > 0 {
             let message = format!("{left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces");
             self.listener.warn(&message);
@@ -123,6 +133,8 @@ impl Context {
     /// What `make` makes of the GPU that is asked for; `None` for the CPU. Where the choice is ours, a GPU on which that fails is passed over.
     pub fn on_gpu<T>(&self, make: impl FnOnce(Arc<Gpu>) -> Result<T>) -> Result<Option<T>> {
         let made = Gpu::open(&self.device).and_then(|gpu| gpu.map(|gpu| make(Arc::new(gpu))).transpose());
+        let place = made.as_ref().map_or("neither", |gpu| if gpu.is_some() { "the GPU" } else { "the CPU" });
+        self.listener.detail(&format!("computed on {place}"));
         match made {
             Err(e) if self.device == Choice::Auto => {
                 self.listener.warn(&format!("on the CPU, since: {e}"));

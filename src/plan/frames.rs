@@ -71,6 +71,9 @@ pub fn render(frames: &Frames, cx: &Context, mut timings: Timings) -> Result<Out
             let path = frames.output.join(&times.name);
             times.pass("write", || image.with_provenance(provenance).write(&path))?;
         }
+        let passes: Vec<String> = times.passes_ms.iter().map(|(pass, ms)| format!("{pass} {ms:.1}")).collect();
+        let what = if kept { "finished already".into() } else { format!("milliseconds: {}", passes.join(", ")) };
+        cx.listener.detail(&format!("{}: {what}", times.name));
         timings.frames.push(times);
     }
     progress.finish();

@@ -10,6 +10,7 @@ pub mod mesh;
 pub mod normals;
 pub mod primitives;
 pub mod round;
+pub mod summary;
 
 use crate::material::Material;
 use std::path::PathBuf;

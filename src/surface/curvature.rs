@@ -50,13 +50,13 @@ pub struct CurvatureMap {
 
 /// The curvature of every vertex of a scene.
 pub fn curvature(geometry: &Geometry, params: &CurvatureParams, progress: &dyn Progress) -> CurvatureMap {
-    progress.start("curvature", geometry.triangles.len() as u64);
+    progress.start("curvature", geometry.positions.len() as u64);
     let objects: Vec<Vec<Curvature>> = geometry
         .objects
         .par_iter()
         .map(|object| {
             let result = object_curvature(geometry, object, params);
-            progress.advance(object.triangles.len() as u64);
+            progress.advance(object.vertices.len() as u64);
             result
         })
         .collect();

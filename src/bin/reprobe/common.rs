@@ -1,13 +1,15 @@
 //! Options that every subcommand has, and how results and progress are shown.
 
+use crate::terminal::Terminal;
 use anyhow::{Context as _, bail};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use reprobe::base::progress::Progress;
 use reprobe::exchange::LoadOptions;
 use reprobe::gpu::Choice;
-use reprobe::plan::{Context, Listener, Outcome};
+use reprobe::plan::{Context, Outcome};
 use std::io::{ErrorKind, Write as _};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+
+/// Where these options stand in the help of a command.
+const HEADING: &str = "Options of every command";
 
 /// More threads than this are a slip of the hand.
 const MOST_THREADS: usize = 1024;
@@ -16,36 +18,56 @@ const MOST_THREADS: usize = 1024;
 #[derive(clap::Args)]
 pub struct Common {
     /// Worker threads [default: all cores]
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, help_heading = HEADING, value_name = "N")]
     pub threads: Option<usize>,
     /// Seed of all random numbers
-    #[arg(long, global = true, value_name = "N", default_value_t = 0)]
+    #[arg(long, global = true, help_heading = HEADING, value_name = "N", default_value_t = 0)]
     pub seed: u32,
     /// Where to compute: auto, cpu, gpu or gpu:NAME
-    #[arg(long, global = true, value_name = "DEVICE", default_value = "auto")]
+    #[arg(long, global = true, help_heading = HEADING, value_name = "DEVICE", default_value = "auto")]
     pub device: Choice,
     /// No progress bar and no summary
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = HEADING)]
     pub quiet: bool,
     /// Print one JSON object with the run's figures in place of the summary
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = HEADING)]
     pub json: bool,
     /// Say more
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = HEADING)]
     pub verbose: bool,
     /// Multiplies all lengths of the scene, to make them metres
-    #[arg(long, global = true, value_name = "S", default_value_t = 1.0)]
+    #[arg(long, global = true, help_heading = HEADING, value_name = "S", default_value_t = 1.0)]
     pub unit_scale: f32,
     /// Gives a scene parameter a value: NAME=VALUE for `$NAME`
-    #[arg(long = "define", short = 'D', global = true, value_name = "NAME=VALUE")]
+    #[arg(long = "define", short = 'D', global = true, help_heading = HEADING, value_name = "NAME=VALUE")]
     pub defines: Vec<String>,
     /// Leave out what a scene asks for and is not supported, with a warning: a grey surface stands
     /// for an unknown scattering model
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = HEADING)]
     pub skip_unsupported: bool,
     /// Take textures whose files end early as far as they go, with a warning
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = HEADING)]
     pub allow_truncated: bool,
+}
+
+/// Takes those of the options out of a command's help that do nothing for it. They are taken all the same, so that a script may give
+/// every command the same ones.
+pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
+    const SCENE: [&str; 4] = ["unit_scale", "defines", "skip_unsupported", "allow_truncated"];
+    for (command, idle) in [
+        ("place-probes", &["device", "seed"][..]),
+        ("resmap", &["seed"]),
+        ("qhmap", &[&["device", "seed"][..], &SCENE].concat()),
+        ("curvature", &["device", "seed"]),
+        ("compare", &[&["device", "seed"][..], &SCENE].concat()),
+        ("devices", &[&["device", "seed", "threads"][..], &SCENE].concat()),
+        ("info", &["device", "seed"]),
+    ] {
+        let hidden: Vec<clap::Arg> =
+            cli.get_arguments().filter(|a| idle.contains(&a.get_id().as_str())).map(|a| a.clone().hide(true)).collect();
+        cli = cli.mut_subcommand(command, |sub| sub.args(hidden));
+    }
+    cli
 }
 
 impl Common {
@@ -72,7 +94,7 @@ impl Common {
             skip_unsupported: self.skip_unsupported,
             allow_truncated: self.allow_truncated,
         };
-        let terminal = Arc::new(Terminal { quiet: self.quiet, bar: Mutex::new(None) });
+        let terminal = Arc::new(Terminal::new(self.quiet, self.verbose));
         Ok(Context::new(self.seed, self.device.clone(), load, terminal)?)
     }
 
@@ -104,44 +126,4 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
     };
     let number: u64 = digits.parse().map_err(|_| expected())?;
     number.checked_mul(1 << shift).ok_or_else(expected)
-}
-
-/// Shows a stage's progress with the time left on a terminal, and says on stderr what it has to say.
-struct Terminal {
-    quiet: bool,
-    bar: Mutex<Option<ProgressBar>>,
-}
-
-impl Progress for Terminal {
-    fn start(&self, what: &str, total: u64) {
-        let target = if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let style = ProgressStyle::with_template("{msg:24} {wide_bar} {percent:>3} %  {elapsed} gone, {eta} left")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-        let bar = ProgressBar::with_draw_target(Some(total), target).with_style(style).with_message(what.to_owned());
-        *self.bar.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar);
-    }
-
-    fn advance(&self, n: u64) {
-        if let Some(bar) = &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
-            bar.inc(n);
-        }
-    }
-
-    fn finish(&self) {
-        if let Some(bar) = self.bar.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            bar.finish_and_clear();
-        }
-    }
-}
-
-impl Listener for Terminal {
-    fn warn(&self, message: &str) {
-        eprintln!("reprobe: warning: {message}");
-    }
-
-    fn say(&self, line: &str) {
-        if !self.quiet {
-            eprintln!("{line}");
-        }
-    }
 }

@@ -4,8 +4,14 @@ use reprobe::plan::stages::Compare;
 use reprobe::plan::views::FrameList;
 use std::path::PathBuf;
 
-/// Measures frames against their references: metrics.json, error maps and a page to look at
+/// Measure frames against their references: metrics.json, error maps and a page to look at
+///
+/// Exit code 1 where a --max-* is passed.
 #[derive(clap::Args)]
+#[command(after_help = "Examples:
+  reprobe compare frames/ reference/ -o report/
+  reprobe compare frames/0003.exr mitsuba.exr -o report/ --layer glossy --exposure 1
+  reprobe compare frames/ reference/ -o report/ --max-rmse 0.02 --max-dssim 0.03")]
 pub struct Args {
     /// EXR file, or folder of frames
     #[arg(value_name = "A")]

@@ -4,8 +4,13 @@ use reprobe::plan::stages::Curvature;
 use reprobe::surface::CurvatureParams;
 use std::path::PathBuf;
 
-/// Estimates the principal curvatures at every vertex
+/// Estimate the principal curvatures at every vertex
+///
+/// Reflections are reprojected by the curvature of what mirrors them.
 #[derive(clap::Args)]
+#[command(after_help = "Examples:
+  reprobe curvature room/scene.xml -o curvature.exr
+  reprobe info curvature.exr --pictures look/")]
 pub struct Args {
     /// Mitsuba scene (XML or JSON)
     scene: PathBuf,

@@ -15,15 +15,29 @@ mod qhmap;
 mod render_path;
 mod resmap;
 mod run;
+mod terminal;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches, Parser};
 use common::Common;
+use reprobe::base::clock::seconds;
+use reprobe::gpu::Choice;
+use reprobe::plan::timings::peak_memory;
 use reprobe::plan::{Context, Outcome, Stage};
 use std::process::ExitCode;
 
 /// Bakes glossy global illumination into light probes and reprojects it into new views.
 #[derive(Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(
+    version,
+    about,
+    propagate_version = true,
+    after_help = "Exit codes: 0 done; 1 a check failed (compare past a --max-*); 2 bad usage or input.
+
+Start with:
+  reprobe run scene.xml -o out/                        everything, with a report to look at
+  reprobe run scene.xml -o out/ --dry-run              the commands that it consists of
+  reprobe COMMAND --help                               what a command reads and writes, with examples"
+)]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -48,10 +62,14 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let Cli { common, command } = Cli::parse();
+    let Cli { common, command } = parse();
+    leave_out_software(&common);
     let run = || {
         common.start()?;
-        let outcome = dispatch(command, &common.context()?)?;
+        let (cx, clock) = (common.context()?, seconds());
+        let outcome = dispatch(command, &cx)?;
+        let memory = peak_memory().map_or_else(String::new, |bytes| format!(", at most {} MiB of memory", bytes >> 20));
+        cx.listener.detail(&format!("{:.2} s in all{memory}", clock()));
         common.report(&outcome)?;
         anyhow::Ok(outcome)
     };
@@ -59,9 +77,25 @@ fn main() -> ExitCode {
         Ok(outcome) if outcome.check_failed => ExitCode::from(1),
         Ok(_) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("reprobe: error: {error:#}");
+            terminal::put(&format!("reprobe: error: {error:#}"));
             ExitCode::from(2)
         }
+    }
+}
+
+/// What was typed; usage errors end the process.
+fn parse() -> Cli {
+    let matches = common::hide_idle(Cli::command()).get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())
+}
+
+/// Keeps Vulkan's loader from software adapters where the choice is ours, as they are only taken by name: starting one costs time, and
+/// some print to stderr.
+fn leave_out_software(common: &Common) {
+    const VARIABLE: &str = "VK_LOADER_DRIVERS_DISABLE";
+    if common.device == Choice::Auto && std::env::var_os(VARIABLE).is_none() {
+        // SAFETY: no other thread runs yet that could read the environment meanwhile.
+        unsafe { std::env::set_var(VARIABLE, "*lvp*,*swrast*,*swiftshader*") };
     }
 }
 
@@ -78,7 +112,7 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::Devices(args) => return devices::run(&args),
         Command::Info(args) => {
             cx.refuse_gpu("info")?;
-            return info::run(&args);
+            return info::run(&args, cx);
         }
         Command::Run(args) => return run::run(&args, cx),
         Command::Evaluate(args) => return evaluate::run(&args, cx),
@@ -92,7 +126,6 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
     use reprobe::plan::stages::{BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -121,6 +154,28 @@ mod tests {
 
     #[test]
     fn the_command_line_is_well_formed() {
-        Cli::command().debug_assert();
+        common::hide_idle(Cli::command()).debug_assert();
+    }
+
+    #[test]
+    fn help_has_examples_and_the_options_that_do_something() {
+        let mut cli = common::hide_idle(Cli::command());
+        cli.build();
+        for sub in cli.get_subcommands_mut().filter(|sub| sub.get_name() != "help") {
+            let (name, help) = (sub.get_name().to_owned(), sub.render_long_help().to_string());
+            assert!(help.contains("Examples:\n"), "{name}");
+            let shows = |option: &str| help.contains(&format!("  {option} ")) || help.contains(&format!(", {option} "));
+            let runs_on_gpu = ["resmap", "bake-probes", "bake-lightmap", "render-path", "run", "evaluate"].contains(&&*name);
+            assert_eq!(shows("--device"), runs_on_gpu, "{name}");
+            assert_eq!(shows("--unit-scale"), !["qhmap", "compare", "devices"].contains(&&*name), "{name}");
+        }
+    }
+
+    #[test]
+    fn an_option_that_does_nothing_for_a_command_is_taken_all_the_same() {
+        let words = ["reprobe", "qhmap", "resmap", "-o", "qhmap", "--seed", "7", "--device", "cpu"];
+        let matches = common::hide_idle(Cli::command()).try_get_matches_from(words).unwrap();
+        let cli = Cli::from_arg_matches(&matches).unwrap();
+        assert_eq!((cli.common.seed, cli.common.device), (7, Choice::Cpu));
     }
 }

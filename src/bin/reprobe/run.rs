@@ -188,12 +188,13 @@ pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
         }
         figures.push(json!({ "command": stage.command_line(cx), "figures": outcome.figures }));
     }
-    let (out, seconds) = (args.output.display(), clock());
+    let (out, seconds) = (|name: &str| args.output.join(name), clock());
+    let page = |folder: &str| out(folder).join("index.html");
     let reports: Vec<String> =
-        comparisons.iter().map(|(_, folder, what)| format!("{out}/{folder}/index.html ({what})")).collect();
+        comparisons.iter().map(|(_, folder, what)| format!("{} ({what})", page(folder).display())).collect();
     let report = if reports.is_empty() { String::new() } else { format!("\nReport: {}", reports.join(", ")) };
     Ok(Outcome {
-        summary: format!("Frames: {out}/frames/NNNN.exr{report}\nDone in {seconds:.0} s."),
+        summary: format!("Frames: {}{report}\nDone in {seconds:.0} s.", out("frames").join("NNNN.exr").display()),
         figures: json!({ "stages": figures, "seconds": seconds }),
         ..Outcome::default()
     })
