@@ -2,6 +2,7 @@
 
 use super::{Folder, pattern, pattern_png};
 use reprobe::io::ExrImage;
+use std::path::Path;
 use std::process::Command;
 
 const SEEDS: u32 = 6;
@@ -23,17 +24,23 @@ fn scene(body: &str) -> String {
     format!("<scene version='3.0.0'>{CAMERA}{body}</scene>")
 }
 
-/// Means of red, green and blue over the image, and their standard deviations by noise.
+/// A scene's text, rendered by [`means`].
 fn render(folder: &Folder, text: &[u8]) -> [(f64, f64); 3] {
     std::fs::write(folder.path("scene.xml"), text).unwrap();
+    means(folder, &folder.path("scene.xml"))
+}
+
+/// Means of red, green and blue over the image, and their standard deviations by noise.
+fn means(folder: &Folder, file: &Path) -> [(f64, f64); 3] {
     let means: Vec<[f64; 3]> = (0..SEEDS)
         .map(|seed| {
             let out = folder.path(&format!("out{seed}"));
             let done = Command::new(env!("CARGO_BIN_EXE_reprobe"))
-                .args(["render-path", "scene.xml", "--method", "path-trace", "--layers", "full", "--device", "cpu", "--quiet"])
+                .arg("render-path")
+                .arg(file)
+                .args(["--method", "path-trace", "--layers", "full", "--device", "cpu", "--quiet"])
                 .args(["--spp", &SPP.to_string(), "--seed", &seed.to_string(), "-o"])
                 .arg(&out)
-                .current_dir(folder.0.path())
                 .output()
                 .unwrap();
             let said = String::from_utf8_lossy(&done.stderr).into_owned();
@@ -61,6 +68,66 @@ fn assert_mitsubas(what: &str, found: [(f64, f64); 3], expected: [f64; 3]) {
         assert!((found - expected).abs() < allowed, "{what}: {found:.5}, Mitsuba {expected}, allowed {allowed:.5}");
         assert!(allowed < 0.01 * expected, "{what}: the tolerance {allowed} shows nothing");
     }
+}
+
+#[test]
+fn lamps_by_reference() {
+    let body = format!(
+        "<shape type='rectangle'>{QUAD}<ref id='lamp'/></shape>
+        <emitter type='area' id='lamp'><rgb name='radiance' value='2,1,0.5'/></emitter>"
+    );
+    assert_mitsubas("area by reference", render(&Folder::new(), scene(&body).as_bytes()), [1.2223, 0.6112, 0.3056]);
+}
+
+#[test]
+fn lamps_that_the_camera_does_not_see() {
+    let hides = |body: &str| {
+        let hidden = "<integrator type='path'><boolean name='hide_emitters' value='true'/></integrator>";
+        scene(body).replace("<integrator type='path'/>", hidden).into_bytes()
+    };
+    let sky = hides(&format!("{LIGHTS}<shape type='rectangle'>{QUAD}</shape>"));
+    assert_mitsubas("sky", render(&Folder::new(), &sky), [0.4737, 0.2842, 0.0947]);
+    let lamp = "<shape type='sphere'><transform name='to_world'><scale value='0.3'/><translate z='1'/></transform>
+        <emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>";
+    let lamp = hides(&format!("<shape type='rectangle'>{QUAD}</shape>{lamp}"));
+    assert_mitsubas("lamp", render(&Folder::new(), &lamp), [0.0432, 0.0259, 0.0086]);
+}
+
+#[test]
+fn shifted_lenses() {
+    let shift = "<float name='fov' value='40'/><float name='principal_point_offset_x' value='0.2'/>
+        <float name='principal_point_offset_y' value='-0.1'/>";
+    let text = scene(&format!("{LIGHTS}<shape type='rectangle'>{QUAD}</shape>"));
+    let text = text.replace("<float name='fov' value='40'/>", shift);
+    assert_mitsubas("principal point", render(&Folder::new(), text.as_bytes()), [0.8776, 0.7032, 0.5288]);
+}
+
+/// Red, green and blue of a line such as "| `scene.xml` | mean R, G, B = 0.8776, 0.7032, 0.5288 (48 x 36) | ...".
+fn told(line: &str) -> Option<(&str, [f64; 3])> {
+    let mut cells = line.split('|').map(str::trim).skip(1);
+    let name = cells.next()?.strip_prefix('`')?.strip_suffix('`')?;
+    let numbers = cells.next()?.strip_prefix("mean R, G, B = ")?.split(" (").next()?;
+    let numbers: Vec<f64> = numbers.split(", ").map(|n| n.parse().unwrap()).collect();
+    Some((name, numbers.try_into().unwrap()))
+}
+
+/// The inputs that users sent, each in a folder with a README that tells Mitsuba's means.
+#[test]
+fn cases_of_users() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/cases");
+    let Ok(entries) = std::fs::read_dir(&cases) else {
+        println!("skipped: no {}", cases.display());
+        return;
+    };
+    let mut count = 0;
+    for folder in entries.map(|entry| entry.unwrap().path()) {
+        let readme = std::fs::read_to_string(folder.join("README.md")).unwrap();
+        for (name, expected) in readme.lines().filter_map(told) {
+            assert_mitsubas(&format!("{}/{name}", folder.display()), means(&Folder::new(), &folder.join(name)), expected);
+            count += 1;
+        }
+    }
+    assert!(count >= 12, "{count}");
 }
 
 #[test]
