@@ -299,10 +299,14 @@ mod tests {
         let grid = grid(Density::Counts([2, 1, 2]));
         grid.write(&path).unwrap();
         assert_eq!(ProbeGrid::read(&path).unwrap(), grid);
-        let good = std::fs::read_to_string(&path).unwrap();
+        let sealed = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, sealed.replace("    2,", "    3,")).unwrap();
+        assert!(ProbeGrid::read(&path).unwrap_err().to_string().contains("has changed since it was written"));
+        // As another program would write it: without a checksum.
+        let good: String = sealed.lines().filter(|line| !line.contains("\"checksum\"")).map(|line| format!("{line}\n")).collect();
         for (from, to, expected) in [
             ("\"blocked\": []", "\"blocked\": [9]", "ascending indices below 4"),
-            ("\"counts\"", "\"count\"", "unknown field `count`"),
+            ("\"counts\"", "\"count\"", "missing field `counts`"),
             ("\"blocked\": []", "\"blocked\": [", "probes.json:"),
             ("    1,\n", "    4000000000,\n", "expected from 1 to 10000"),
             ("    1,\n", "    2,\n", "4 positions, expected 8"),
