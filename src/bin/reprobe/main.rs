@@ -63,7 +63,9 @@ enum Command {
 
 fn main() -> ExitCode {
     let Cli { common, command } = parse();
-    leave_out_software(&common);
+    if common.device == Choice::Auto && !matches!(command, Command::Devices(_)) {
+        leave_out_software();
+    }
     let run = || {
         common.start()?;
         let (cx, clock) = (common.context()?, seconds());
@@ -91,9 +93,9 @@ fn parse() -> Cli {
 
 /// Keeps Vulkan's loader from software adapters where the choice is ours, as they are only taken by name: starting one costs time, and
 /// some print to stderr.
-fn leave_out_software(common: &Common) {
+fn leave_out_software() {
     const VARIABLE: &str = "VK_LOADER_DRIVERS_DISABLE";
-    if common.device == Choice::Auto && std::env::var_os(VARIABLE).is_none() {
+    if std::env::var_os(VARIABLE).is_none() {
         // SAFETY: no other thread runs yet that could read the environment meanwhile.
         unsafe { std::env::set_var(VARIABLE, "*lvp*,*swrast*,*swiftshader*") };
     }
