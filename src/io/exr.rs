@@ -127,9 +127,17 @@ impl ExrImage {
     /// The image that the file is of: `R`, `G`, `B`; else the colours of a layer; else luminance, or the one channel that there is, as
     /// grey. Also a word of the layers that were passed over, where several would do.
     pub fn picture(&self, path: &Path) -> Result<(Vec<Rgb>, Option<String>)> {
+        if self.channels.iter().any(|(name, _)| ["r", "g", "b"].contains(&last_part(name))) {
+            return self.with_capitals().picture(path);
+        }
         let has = |name: &str| self.channels.iter().any(|(n, _)| n == name);
         if has("R") && has("G") && has("B") {
             return Ok((self.rgb(path, "")?, None));
+        }
+        if has("X") && has("Y") && has("Z") {
+            let [x, y, z] = ["X", "Y", "Z"].map(|name| self.f32(path, name));
+            let xyz = x?.into_iter().zip(y?).zip(z?).map(|((x, y), z)| Rgb::new(x, y, z));
+            return Ok((xyz.map(primaries::rec709_from_xyz).collect(), None));
         }
         let layers: Vec<&str> = self.channels.iter().filter_map(|(n, _)| n.strip_suffix(".R")).collect();
         let layers: Vec<&str> = layers.into_iter().filter(|l| has(&format!("{l}.G")) && has(&format!("{l}.B"))).collect();
@@ -146,6 +154,18 @@ impl ExrImage {
             _ => "Y",
         };
         Ok((self.f32(path, name)?.into_iter().map(Rgb::splat).collect(), None))
+    }
+
+    /// The same with channels `r`, `g`, `b` under their usual names.
+    fn with_capitals(&self) -> Self {
+        let mut image = self.clone();
+        for (name, _) in &mut image.channels {
+            if let Some(start) = ["r", "g", "b", "a"].contains(&last_part(name)).then(|| name.len() - 1) {
+                let capital = name[start..].to_uppercase();
+                name.replace_range(start.., &capital);
+            }
+        }
+        image
     }
 
     /// The provenance, or an error that says that there is none.

@@ -1,6 +1,6 @@
 //! What red, green and blue a file means, and how they become Rec.709's.
 
-use glam::{DMat3, DVec3, Mat3};
+use glam::{DMat3, DVec3, Mat3, Vec3};
 
 /// Red, green, blue and white of Rec.709 on CIE's chromaticity diagram (x, y).
 const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
@@ -20,6 +20,11 @@ pub fn to_rec709(primaries: [[f32; 2]; 4]) -> Result<Option<Mat3>, String> {
     }
 }
 
+/// A colour of CIE XYZ.
+pub fn rec709_from_xyz(xyz: Vec3) -> Vec3 {
+    (xyz_from_rgb(REC709).inverse() * xyz.as_dvec3()).as_vec3()
+}
+
 /// The shares of red, green and blue in luminance; Rec.709's where no primaries are named.
 pub fn luminance_weights(primaries: Option<[[f32; 2]; 4]>) -> [f32; 3] {
     xyz_from_rgb(primaries.unwrap_or(REC709)).row(1).as_vec3().to_array()
@@ -35,7 +40,6 @@ fn xyz_from_rgb(primaries: [[f32; 2]; 4]) -> DMat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     /// Values: Mitsuba 3.9.1, `Bitmap` of (0.2, 0.5, 0.8) in an EXR file of these primaries.
     #[test]
@@ -53,6 +57,7 @@ mod tests {
         // XYZ itself: the textbook's matrix.
         let xyz = to_rec709([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0 / 3.0; 2]]).unwrap().unwrap();
         assert!((xyz * Vec3::Y - Vec3::new(-1.5372, 1.876, -0.204)).abs().max_element() < 5e-4);
+        assert!((rec709_from_xyz(Vec3::Y) - Vec3::new(-1.5372, 1.876, -0.204)).abs().max_element() < 5e-4);
         assert_eq!(to_rec709(REC709), Ok(None));
         assert!(to_rec709([[0.3, 0.3]; 4]).is_err());
     }

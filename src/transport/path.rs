@@ -129,12 +129,37 @@ pub fn transmitted_irradiance(
 /// Radiance that a camera sees along `ray`, emission included (unless the scene hides its emitters), without a split.
 pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     if world.scene.hide_emitters {
-        let of = |surface: Surface| scattered(world, &surface, -ray.d, Query::default(), None, params, sampler);
+        let of = |surface: Surface| past_emitters(world, surface, -ray.d, params, sampler);
         return world.seen(ray).map_or(Rgb::ZERO, of);
     }
     let from = Receiver { p: ray.o, n: Vec3::ZERO };
     let start = Start { ray: *ray, from, pdf: 1.0, delta: true, eta: 1.0, depth: 0 };
     keep_finite(incident(world, start, None, params, sampler))
+}
+
+/// [`scattered`] where cameras see no emitters: as in Mitsuba, none behind thin glass either that lets the ray straight through.
+fn past_emitters(world: &World, mut surface: Surface, mut wo: Vec3, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+    let mut throughput = Rgb::ONE;
+    for depth in 0..params.max_depth {
+        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        if !matches!(bsdf, Bsdf::ThinDielectric(_)) {
+            let rest = PathParams { max_depth: params.max_depth - depth, ..*params };
+            return throughput * scattered(world, &surface, wo, Query::default(), None, &rest, sampler);
+        }
+        let [x, y, lobe, _] = sampler.next_4d();
+        let wi = surface.frame.to_local(wo);
+        let Some(sample) = bsdf.sample(&surface, wi, lobe, Vec2::new(x, y), Query::default()) else { return Rgb::ZERO };
+        throughput *= sample.weight;
+        let ray = surface.spawn(surface.frame.to_world(sample.wo));
+        if sample.wo.z * wi.z > 0.0 {
+            let from = Receiver { p: surface.p, n: Vec3::ZERO };
+            let start = Start { ray, from, pdf: sample.pdf, delta: true, eta: sample.eta, depth: depth + 1 };
+            return keep_finite(throughput * incident(world, start, None, params, sampler));
+        }
+        let Some(next) = world.seen(&ray) else { return Rgb::ZERO };
+        (surface, wo) = (next, -ray.d);
+    }
+    Rgb::ZERO
 }
 
 /// Samples that were not finite and counted as zero, since the program started (debug builds only).

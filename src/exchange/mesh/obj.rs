@@ -2,7 +2,7 @@
 //!
 //! As Mitsuba: one mesh a file whatever its groups, one vertex a distinct position/uv/normal triple in order of first use, polygons as
 //! fans, v stored as 1 - v, and a vertex's weight `w`, which is of rational curves and surfaces alone, passed over.
-//! Ours: corners without uv in a file that has some get (0, 0), corners without normal a smooth one; a line that ends in a backslash goes
+//! Ours: corners without uv in a file that has some, whatever those beside them have, get (0, 0), corners without normal a smooth one; a line that ends in a backslash goes
 //! on in the next, as the format has it; colours after a position are the attribute `vertex_color`.
 
 use super::{MeshAttribute, MeshFile};
@@ -128,7 +128,8 @@ impl Lines {
     }
 
     fn into_file(self) -> MeshFile {
-        let (any_uv, any_normal) = (self.corners.iter().any(|c| c[1] != NONE), self.corners.iter().any(|c| c[2] != NONE));
+        // As Mitsuba: texture coordinates that the file has and no face refers to make those of all vertices (0, 0).
+        let (any_uv, any_normal) = (!self.uvs.is_empty(), self.corners.iter().any(|c| c[2] != NONE));
         let mut mesh = Mesh::default();
         let mut colors = Vec::new();
         let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());
@@ -183,13 +184,6 @@ fn numbers(line: &[u8], rest: &[u8], least: usize, out: &mut [f32]) -> std::resu
     }
 }
 
-/// Which indices the corners of a face have.
-#[derive(Clone, Copy, PartialEq)]
-struct Kind {
-    uv: bool,
-    normal: bool,
-}
-
 /// Reads one face's corners into `out`. Absolute indices are compared later, when all lines are counted.
 fn face(
     corners: &[u8],
@@ -198,11 +192,9 @@ fn face(
     highest: &mut [(i64, u32); 3],
     out: &mut Vec<[u32; 3]>,
 ) -> std::result::Result<(), String> {
-    let mut kind = None;
     let mut n = 0;
     for corner in corners.split(u8::is_ascii_whitespace).filter(|c| !c.is_empty()) {
         let shown = || String::from_utf8_lossy(corner).into_owned();
-        let mut seen = [false; 3];
         let mut indices = [NONE; 3];
         for (k, index) in corner.split(|&b| b == b'/').enumerate() {
             if k > 2 {
@@ -224,20 +216,14 @@ fn face(
             }
             // Negative ones count back from the last line so far.
             indices[k] = if value > 0 { value - 1 } else { counts[k] as i64 + value } as u32;
-            seen[k] = true;
         }
-        let this = Kind { uv: seen[1], normal: seen[2] };
-        if !seen[0] || kind.is_some_and(|k| k != this) {
-            return Err(format!("face corner \"{}\" does not match the face's other corners", shown()));
+        if indices[0] == NONE {
+            return Err(format!("face corner \"{}\" has no position", shown()));
         }
-        kind = Some(this);
         out.push(indices);
         n += 1;
     }
-    match kind {
-        Some(_) if n >= 3 => Ok(()),
-        _ => Err(format!("face of {n} corners, expected at least 3")),
-    }
+    if n >= 3 { Ok(()) } else { Err(format!("face of {n} corners, expected at least 3")) }
 }
 
 #[cfg(test)]

@@ -92,8 +92,23 @@ impl<'a> Params<'a> {
 
     /// One of several words.
     pub fn choice<T: Copy>(&mut self, name: &str, default: T, words: &[(&str, T)]) -> Result<T> {
+        self.choice_where(name, default, words, |word, text| word == text)
+    }
+
+    /// One of several words, where Mitsuba does not ask how they are capitalised.
+    pub fn choice_of_any_case<T: Copy>(&mut self, name: &str, default: T, words: &[(&str, T)]) -> Result<T> {
+        self.choice_where(name, default, words, str::eq_ignore_ascii_case)
+    }
+
+    fn choice_where<T: Copy>(
+        &mut self,
+        name: &str,
+        default: T,
+        words: &[(&str, T)],
+        is: impl Fn(&str, &str) -> bool,
+    ) -> Result<T> {
         let Some(text) = self.text(name)? else { return Ok(default) };
-        words.iter().find(|(w, _)| *w == text).map(|(_, t)| *t).ok_or_else(|| {
+        words.iter().find(|(w, _)| is(w, text)).map(|(_, t)| *t).ok_or_else(|| {
             let known: Vec<_> = words.iter().map(|(w, _)| *w).collect();
             self.at(name).error(format!("{name} = \"{text}\": expected one of {}", known.join(", ")))
         })
@@ -154,6 +169,10 @@ impl<'a> Params<'a> {
             Value::Uniform(x) => Some(if emitter { EQUAL_ENERGY_WHITE } else { Rgb::ONE } * *x as f32),
             Value::Color(c) => Some(*c),
             Value::Vector(v) => Some(v.as_vec3()),
+            // A surface does not reflect more than there is.
+            Value::Spectrum(pairs) if !emitter && !matches!(p.name.as_str(), "eta" | "k") => {
+                Some(reduce(pairs, emitter).min(Rgb::ONE))
+            }
             Value::Spectrum(pairs) => Some(reduce(pairs, emitter)),
             _ => match self.plugin_of(p)? {
                 Some(plugin) if plugin.kind == Kind::Texture => spectrum_plugin::color(plugin, self, emitter)?,
@@ -223,6 +242,11 @@ impl<'a> Params<'a> {
     /// Warns of what was not taken.
     pub fn finish(self, warnings: &mut Vec<String>) {
         warnings.extend(self.odd);
+        for (i, p) in self.node.params.iter().enumerate() {
+            if !p.name.is_empty() && self.node.params[..i].iter().any(|q| q.name == p.name) {
+                warnings.push(p.at.warning(format!("{}: {} is given again: the last one counts", self.node.plugin, p.name)));
+            }
+        }
         for (p, _) in self.node.params.iter().zip(&self.taken).filter(|(_, taken)| !**taken) {
             // What is not supported at all is told elsewhere.
             if matches!(&p.value, Value::Plugin(n) if n.kind == Kind::Unsupported) {

@@ -5,6 +5,9 @@ use glam::{DMat3, DMat4, DVec3, DVec4};
 /// No coordinate of a sane scene is larger, and products of a few stay finite in single precision.
 const LARGEST: f64 = 1e15;
 
+/// Extent of what is flat, of the largest of the others.
+const THIN: f64 = 1e-6;
+
 /// A transform under construction.
 #[derive(Debug, Clone, Copy)]
 pub struct Steps(DMat4);
@@ -66,8 +69,15 @@ impl Steps {
         }
     }
 
-    /// All steps in one; one that flattens space (determinant 0) is an error.
-    pub fn finish(self) -> Result<DMat4, String> {
+    /// All steps in one. One that takes all extent from one axis leaves it a millionth of the largest, so that it can be inverted:
+    /// what is flat looks the same. One that flattens space otherwise is an error.
+    pub fn finish(mut self) -> Result<DMat4, String> {
+        let axes = [0, 1, 2].map(|k| self.0.col(k).truncate());
+        let largest = axes.iter().map(|a| a.length()).fold(0.0, f64::max);
+        if let Some(k) = axes.iter().position(|a| *a == DVec3::ZERO) {
+            let normal = axes[(k + 1) % 3].cross(axes[(k + 2) % 3]).normalize_or_zero();
+            *self.0.col_mut(k) = (normal * largest * THIN).extend(0.0);
+        }
         let inverse = self.0.inverse();
         let invertible = self.0.determinant() != 0.0 && inverse.is_finite() && inverse.as_mat4().is_finite();
         if invertible { Ok(self.0) } else { Err("the transform flattens space: expected one that can be inverted".into()) }
@@ -139,8 +149,16 @@ mod tests {
         assert!(Steps::default().matrix(&[1.0; 16]).is_err(), "projective");
         assert!(Steps::default().rotate(DVec3::ZERO, 1.0).is_err());
         assert!(Steps::default().look_at(DVec3::X, DVec3::X, None).is_err());
-        let mut flat = Steps::default();
-        flat.scale(DVec3::new(1.0, 0.0, 1.0)).unwrap();
-        assert!(flat.finish().is_err());
+        let flattened = |by| {
+            let mut flat = Steps::default();
+            flat.scale(by).unwrap();
+            flat.finish()
+        };
+        let flat = flattened(DVec3::new(1.0, 0.0, 2.0)).unwrap();
+        assert!((flat.transform_point3(DVec3::ONE) - DVec3::new(1.0, 0.0, 2.0)).length() < 1e-5);
+        assert!(flattened(DVec3::new(1.0, 0.0, 0.0)).is_err());
+        let mut slanted = Steps::default();
+        slanted.matrix(&[1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]).unwrap();
+        assert!(slanted.finish().is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! Image files: PNG, JPEG, BMP, TGA, HDR and EXR.
+//! Image files: PNG, JPEG, BMP, TGA, PNM, PFM, HDR and EXR.
 
 use super::{Image, Pixels};
 use crate::base::math::{Rgb, linear_from_srgb};
@@ -29,7 +29,11 @@ pub fn read(path: &Path, options: ReadOptions) -> Result<(Image, Vec<String>)> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
     let mut odd = Vec::new();
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
-    let mut image = if is_exr { read_exr(path, &bytes, &mut odd)? } else { read_other(path, bytes, options, &mut odd)? };
+    let mut image = match bytes.first_chunk() {
+        _ if is_exr => read_exr(path, &bytes, &mut odd)?,
+        Some(b"PF" | b"Pf") => read_pfm(&bytes).map_err(|message| Error::input(path, message))?,
+        _ => read_other(path, bytes, options, &mut odd)?,
+    };
     if let Pixels::Float(pixels) = &mut image.pixels {
         odd.extend(make_finite(pixels).map(|what| format!("{}: {what}", path.display())));
     }
@@ -45,7 +49,7 @@ fn make_finite(pixels: &mut [Rgb]) -> Option<String> {
     for p in pixels.iter_mut().filter(|p| !p.is_finite()) {
         infinite += usize::from(p.to_array().iter().any(|x| x.is_infinite()));
         no_number += usize::from(p.is_nan());
-        *p = p.map(|x| if x.is_nan() { 0.0 } else { x.clamp(-largest, largest) });
+        *p = p.map(|x| if x.is_nan() { 0.0 } else { x.clamp(0.0, largest) });
     }
     let told = [(infinite, format!("infinite, taken for {largest}")), (no_number, "no number, taken for 0".into())];
     let told: Vec<_> = told.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} pixels are {what}")).collect();
@@ -58,6 +62,39 @@ fn read_exr(path: &Path, bytes: &[u8], odd: &mut Vec<String>) -> Result<Image> {
     let (pixels, others) = exr.picture(path)?;
     odd.extend(others.map(|others| format!("{}: {others}", path.display())));
     Ok(Image::new(exr.width, exr.height, pixels))
+}
+
+/// Floats, rows from the bottom, after a head of "PF" (or "Pf" for grey), width, height and a factor that is below 0 where they are
+/// little-endian.
+fn read_pfm(bytes: &[u8]) -> std::result::Result<Image, String> {
+    let head = "a PFM file: expected PF or Pf, width, height and scale";
+    let mut at = 0;
+    let mut word = || {
+        let start = at + bytes[at..].iter().position(|b| !b.is_ascii_whitespace())?;
+        let end = start + bytes[start..].iter().position(u8::is_ascii_whitespace)?;
+        at = end;
+        std::str::from_utf8(&bytes[start..end]).ok()
+    };
+    let channels = if word() == Some("PF") { 3 } else { 1 };
+    let mut side = || word().and_then(|w| w.parse::<u32>().ok()).filter(|n| (1..=MAX_SIDE).contains(n));
+    let (Some(width), Some(height)) = (side(), side()) else { return Err(head.into()) };
+    let scale = word().and_then(|w| w.parse::<f32>().ok()).filter(|s| s.is_finite() && *s != 0.0).ok_or(head)?;
+    let (width, height) = (width as usize, height as usize);
+    let rows = bytes.get(at + 1..).unwrap_or_default();
+    let expected = width * height * channels * 4;
+    if rows.len() < expected {
+        return Err(format!("a PFM file of {width} x {height} pixels with {} bytes of them: expected {expected}", rows.len()));
+    }
+    let number = |b: &[u8]| {
+        let b = b.try_into().unwrap_or_default();
+        scale.abs() * if scale < 0.0 { f32::from_le_bytes(b) } else { f32::from_be_bytes(b) }
+    };
+    let pixel = |p: &[u8]| match channels {
+        3 => Rgb::new(number(&p[..4]), number(&p[4..8]), number(&p[8..])),
+        _ => Rgb::splat(number(p)),
+    };
+    let rows = rows[..expected].chunks_exact(width * channels * 4).rev();
+    Ok(Image::new(width, height, rows.flat_map(|row| row.chunks_exact(channels * 4)).map(pixel).collect()))
 }
 
 fn check_size(path: &Path, width: usize, height: usize) -> Result<()> {
@@ -115,13 +152,24 @@ fn linear(decoded: DynamicImage, raw: bool) -> Image {
     Image::new(width, height, pixels)
 }
 
-/// A Radiance picture under the one name that the decoder knows: `#?RGBE` and others stand for the same.
+/// A Radiance picture as the decoder knows it: `#?RGBE` and others stand for `#?RADIANCE`, and lines may end as on Windows.
 fn radiance(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let name = bytes.strip_prefix(b"#?").and_then(|rest| rest.iter().take(40).position(|b| *b == b'\n'));
-    match name {
-        Some(length) if !bytes.starts_with(b"#?RADIANCE") => Cow::Owned([b"#?RADIANCE", &bytes[2 + length..]].concat()),
-        _ => Cow::Borrowed(bytes),
+    let Some(length) = bytes.strip_prefix(b"#?").and_then(|rest| rest.iter().take(40).position(|b| *b == b'\n')) else {
+        return Cow::Borrowed(bytes);
+    };
+    let windows = bytes[1 + length] == b'\r';
+    if !windows && bytes.starts_with(b"#?RADIANCE") {
+        return Cow::Borrowed(bytes);
     }
+    let mut rest = Cow::Borrowed(&bytes[2 + length..]);
+    // The head ends with the line of the size, which follows an empty one.
+    let end = bytes.windows(4).position(|w| w == b"\r\n\r\n").map(|i| i + 4);
+    let end = end.and_then(|i| Some(i + bytes[i..].iter().position(|b| *b == b'\n')? + 1));
+    if let (true, Some(end)) = (windows, end) {
+        let head = bytes[2 + length..end].iter().filter(|b| **b != b'\r');
+        rest = Cow::Owned(head.chain(&bytes[end..]).copied().collect());
+    }
+    Cow::Owned([b"#?RADIANCE", &*rest].concat())
 }
 
 /// Whether a JPEG's segments go on to the end marker: the decoder fills in what is missing without a word.
@@ -185,6 +233,29 @@ mod tests {
         let grey = dir.path().join("y.exr");
         ExrImage::new(1, 1).with_f32("depth", vec![3.0]).write(&grey).unwrap();
         assert_eq!(read(&grey, true).unwrap().pixel(0, 0), Rgb::splat(3.0));
+    }
+
+    /// Values: Mitsuba 3.9.1's `Bitmap` of the same files.
+    #[test]
+    fn portable_maps_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let numbers = [0.1f32, 0.1, 0.2, 0.5, 0.25, 4.0];
+        let path = dir.path().join("a.pfm");
+        for (head, little, factor) in [("PF\n1 2\n-1.0\n", true, 1.0), ("PF 1 2 1\n", false, 1.0), ("PF\n1\n2\n-2\n", true, 2.0)]
+        {
+            let data = numbers.iter().flat_map(|x| if little { x.to_le_bytes() } else { x.to_be_bytes() });
+            std::fs::write(&path, head.bytes().chain(data).collect::<Vec<u8>>()).unwrap();
+            let image = read(&path, false).unwrap();
+            assert_eq!(image.pixel(0, 1), Rgb::new(0.1, 0.1, 0.2) * factor, "{head}");
+            assert_eq!(image.pixel(0, 0), Rgb::new(0.5, 0.25, 4.0) * factor, "{head}");
+        }
+        for bad in [&b"PF\n1 2\n-1.0\n1234"[..], b"PF\n0 2\n-1\n", b"PF", b"PF\n99999999 99999999\n-1\n", b"Pf\n1 1\n0\n1234"] {
+            std::fs::write(&path, bad).unwrap();
+            assert!(read(&path, false).unwrap_err().to_string().contains("a PFM file"));
+        }
+        let path = dir.path().join("a.ppm");
+        std::fs::write(&path, b"P6\n1 1\n255\n\xff\xe4\x22").unwrap();
+        assert!((read(&path, false).unwrap().pixel(0, 0) - Rgb::new(1.0, 0.775_822, 0.015_996)).abs().max_element() < 1e-5);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<MeshFile> {
     if !element("vertex").is_some_and(|e| ["x", "y", "z"].iter().all(|n| e.number(n).is_some())) {
         return Err(Error::input(path, "no vertex properties x, y and z found"));
     }
-    if element("face").is_none_or(|e| e.list(&CORNERS).is_none()) {
+    if element("face").is_some_and(|e| e.list(&CORNERS).is_none()) {
         return Err(Error::input(path, "no face property vertex_indices found"));
     }
     let mut numbers = Numbers::new(path, bytes, header.end, header.encoding);
@@ -55,9 +55,6 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<MeshFile> {
                 }
             }
         }
-    }
-    if file.mesh.triangles.is_empty() {
-        return Err(Error::input(path, "no faces found, expected at least one"));
     }
     check(&file.mesh).map_err(|e| Error::input(path, e))?;
     if !faces.corner_uvs.is_empty() && file.mesh.uvs.is_empty() {

@@ -140,7 +140,7 @@ impl<'a> Builder<'a> {
                 (Bsdf::TwoSided(TwoSided { front: boxed, back }), opacity)
             }
             "mask" => {
-                let own = self.textured(p, "opacity", 0.5)?;
+                let own = self.scalar(p, "opacity", 0.5)?;
                 if matches!(own, Texture::Attribute(_)) {
                     p.warn(node.at.warning("mask: of a mesh_attribute the mean is taken"));
                 }
@@ -159,7 +159,7 @@ impl<'a> Builder<'a> {
             "normalmap" => (Bsdf::NormalMap(NormalMap { texture: self.only_texture(p)?, nested: boxed }), opacity),
             _ => {
                 let (b, other_opacity) = second.ok_or_else(|| node.at.error("no second nested bsdf"))?;
-                let weight = self.textured(p, "weight", 0.5)?;
+                let weight = self.scalar(p, "weight", 0.5)?;
                 let mut blend = Blend { weight, a: boxed, b: Box::new(b), coverage: None };
                 if opacity.is_none() && other_opacity.is_none() {
                     return Ok((Bsdf::Blend(blend), None));
@@ -209,17 +209,28 @@ impl<'a> Builder<'a> {
                 p.at("material").error(format!("unknown metal \"{name}\": expected none or one of {}", ior::metal_names()))
             })?,
             // As in Mitsuba: what is not given is that of `none`.
-            _ => (p.color("eta", Rgb::ZERO)?, p.color("k", Rgb::ONE)?),
+            _ => (self.mean_color(p, "eta", Rgb::ZERO)?, self.mean_color(p, "k", Rgb::ONE)?),
         };
         Ok(Conductor { eta: eta / outside, k: k / outside, specular_reflectance })
     }
 
+    /// A colour, or the mean of a texture.
+    fn mean_color(&mut self, p: &mut Params<'a>, name: &str, default: Rgb) -> Result<Rgb> {
+        match p.get(name) {
+            Some(param) if p.color_of(param)?.is_none() => {
+                p.warn(param.at.warning(format!("{name}: of a texture the mean is taken")));
+                Ok(self.textured(p, name, 0.0)?.mean())
+            }
+            _ => p.color(name, default),
+        }
+    }
+
     fn alphas(&mut self, p: &mut Params<'a>) -> Result<(Texture, Texture)> {
         if p.has("alpha") {
-            let alpha = self.textured(p, "alpha", 0.1)?;
+            let alpha = self.scalar(p, "alpha", 0.1)?;
             return Ok((alpha.clone(), alpha));
         }
-        Ok((self.textured(p, "alpha_u", 0.1)?, self.textured(p, "alpha_v", 0.1)?))
+        Ok((self.scalar(p, "alpha_u", 0.1)?, self.scalar(p, "alpha_v", 0.1)?))
     }
 
     fn principled(&mut self, p: &mut Params<'a>) -> Result<PrincipledParams> {
@@ -230,17 +241,17 @@ impl<'a> Builder<'a> {
         };
         Ok(PrincipledParams {
             base_color: self.textured(p, "base_color", 0.5)?,
-            roughness: self.textured(p, "roughness", 0.5)?,
-            anisotropic: self.textured(p, "anisotropic", 0.0)?,
-            metallic: self.textured(p, "metallic", 0.0)?,
-            spec_trans: self.textured(p, "spec_trans", 0.0)?,
+            roughness: self.scalar(p, "roughness", 0.5)?,
+            anisotropic: self.scalar(p, "anisotropic", 0.0)?,
+            metallic: self.scalar(p, "metallic", 0.0)?,
+            spec_trans: self.scalar(p, "spec_trans", 0.0)?,
             eta,
-            spec_tint: self.textured(p, "spec_tint", 0.0)?,
-            sheen: self.textured(p, "sheen", 0.0)?,
-            sheen_tint: self.textured(p, "sheen_tint", 0.0)?,
-            flatness: self.textured(p, "flatness", 0.0)?,
-            clearcoat: self.textured(p, "clearcoat", 0.0)?,
-            clearcoat_gloss: self.textured(p, "clearcoat_gloss", 0.0)?,
+            spec_tint: self.scalar(p, "spec_tint", 0.0)?,
+            sheen: self.scalar(p, "sheen", 0.0)?,
+            sheen_tint: self.scalar(p, "sheen_tint", 0.0)?,
+            flatness: self.scalar(p, "flatness", 0.0)?,
+            clearcoat: self.scalar(p, "clearcoat", 0.0)?,
+            clearcoat_gloss: self.scalar(p, "clearcoat_gloss", 0.0)?,
         })
     }
 }
@@ -251,7 +262,7 @@ fn grey(reflectance: f32) -> Bsdf {
 
 fn distribution(p: &mut Params) -> Result<Distribution> {
     p.accept(&["sample_visible"]);
-    p.choice("distribution", Distribution::Beckmann, &DISTRIBUTIONS)
+    p.choice_of_any_case("distribution", Distribution::Beckmann, &DISTRIBUTIONS)
 }
 
 fn alpha_number(p: &mut Params) -> Result<f32> {

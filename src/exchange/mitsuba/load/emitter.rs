@@ -69,10 +69,13 @@ impl<'a> Builder<'a> {
         let to_world = self.placed(p)?.as_mat4();
         let cutoff = p.positive("cutoff_angle", 20.0)?;
         let beam = not_negative(p, "beam_width", 0.75 * cutoff)?;
-        if beam > cutoff || cutoff > 180.0 {
-            let message = format!("cutoff_angle = {cutoff}, beam_width = {beam}: expected beam <= cutoff <= 180");
-            return Err(p.node.at.error(message));
+        if cutoff > 180.0 {
+            return Err(p.at("cutoff_angle").error(format!("cutoff_angle = {cutoff}: expected at most 180")));
         }
+        if beam > cutoff {
+            p.warn(p.at("beam_width").warning(format!("beam_width = {beam}: the light ends at {cutoff} degrees")));
+        }
+        let beam = beam.min(cutoff);
         let pattern = match p.has("texture") {
             true => {
                 let (texture, half) = (self.textured(p, "texture", 1.0)?, Vec2::splat(cutoff.to_radians().tan()));
@@ -102,7 +105,10 @@ impl<'a> Builder<'a> {
         });
         match plugins.into_iter().any(|plugin| uses(&plugin)) {
             true => Ok(()),
-            false => Err(node.at.error("found an area emitter that no shape holds or refers to")),
+            false => {
+                self.scene.warnings.push(node.at.warning("an area emitter that no shape holds or refers to lights nothing"));
+                Ok(())
+            }
         }
     }
 

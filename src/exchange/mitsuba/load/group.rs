@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 const MAX_TRIANGLES: usize = 50_000_000;
 
 /// Most shapes in groups, which could multiply without end by referring to groups.
-const MAX_SHAPES: usize = 1_000_000;
+pub(super) const MAX_SHAPES: usize = 1_000_000;
 
 impl<'a> Builder<'a> {
     /// Adds a shape, or all shapes of a group.

@@ -23,8 +23,38 @@ const FILM_DIAGONAL_MM: f32 = 43.266_615;
 /// Longest side of a film, pixels.
 const MAX_SIDE: i64 = 65_536;
 
+/// Properties of films, of Mitsuba 0.6 to 3, that change nothing here: files, their numbers' types, borders, tone mapping.
+const FILM: [&str; 23] = [
+    "file_format",
+    "pixel_format",
+    "component_format",
+    "compensate",
+    "sample_border",
+    "filename",
+    "banner",
+    "high_quality_edges",
+    "attach_log",
+    "tonemap_method",
+    "gamma",
+    "exposure",
+    "key",
+    "burn",
+    "has_variance",
+    "digits",
+    "variable",
+    "fov",
+    "label",
+    "channel_names",
+    "channel_name",
+    "crop_window",
+    "rfilter",
+];
+
 /// What stands for `near_clip` and `far_clip` where only one is given.
 const EVERYTHING: (f32, f32) = (0.0, f32::INFINITY);
+
+/// Mitsuba's `far_clip`, where a lens is focused that is not told of another distance.
+const FAR: f32 = 10_000.0;
 
 /// A film's size and the part of it that is rendered, pixels.
 struct Window {
@@ -49,11 +79,16 @@ impl<'a> Builder<'a> {
         let window = self.film(p)?;
         // Axes and clipping planes are about the whole film, also where only a part of it is rendered.
         let fov_x = if parallel { 1.0 } else { fov_x(p, window.film)? };
-        let (aperture_radius, focus_distance) = match lens {
-            true => (p.positive("aperture_radius", 1.0)?, p.positive("focus_distance", 1.0)?),
-            // Perspective sensors of Mitsuba 0.6 carry a distance that they do not use.
-            false => (0.0, p.positive("focus_distance", 1.0)?),
-        };
+        // Perspective sensors of Mitsuba 0.6 carry a distance that they do not use.
+        let far = p.f32("far_clip", FAR)?;
+        let focus_distance = p.f32("focus_distance", far)?;
+        if focus_distance <= 0.0 {
+            return Err(p.at("focus_distance").error(format!("focus_distance = {focus_distance}: expected more than 0")));
+        }
+        let aperture_radius = if lens { p.f32("aperture_radius", 0.0)? } else { 0.0 };
+        if aperture_radius < 0.0 {
+            return Err(p.at("aperture_radius").error(format!("aperture_radius = {aperture_radius}: expected at least 0")));
+        }
         if lens && !p.has("aperture_radius") {
             return Err(node.at.error("thinlens has no \"aperture_radius\""));
         }
@@ -108,12 +143,17 @@ impl<'a> Builder<'a> {
                 }
                 window.size[i] = size as u32;
             }
+            if let Some(format) = film.text("pixel_format")?.filter(|f| !["rgb", "rgba"].contains(f)) {
+                film.warn(film.at("pixel_format").warning(format!("pixel_format = {format}: frames are red, green and blue")));
+            }
+            film.accept(&FILM);
             for filter in film.children(Kind::Other)? {
                 if let Some(found) = self.filter(filter)? {
                     let named = format!("{} ({}:{})", filter.plugin, filter.at.file.display(), filter.at.line);
                     self.scene.film_filter = FilmFilter { filter: found, named: Some(named) };
                 }
             }
+            film.finish(&mut self.scene.warnings);
         }
         Ok(window)
     }
@@ -155,7 +195,7 @@ fn clip(p: &mut Params) -> Result<(f32, f32)> {
 
 /// Horizontal field of view, radians, of an image of `size`, by `fov` and `fov_axis` or by `focal_length`.
 pub(super) fn fov_x(p: &mut Params, size: [u32; 2]) -> Result<f32> {
-    let axis = p.choice("fov_axis", FovAxis::X, &AXES)?;
+    let axis = p.choice_of_any_case("fov_axis", FovAxis::X, &AXES)?;
     let (fov, axis) = if p.has("fov") {
         let fov = p.f32("fov", 0.0)?;
         if !(fov > 0.0 && fov < 180.0) {

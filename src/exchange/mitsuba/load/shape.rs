@@ -2,7 +2,7 @@
 
 use super::Builder;
 use super::attribute::Current;
-use super::round::{cylinder, described};
+use super::round::{cylinder, described, is_stretched, sphere, uniform};
 use crate::base::math::Rgb;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, Node};
@@ -11,7 +11,7 @@ use crate::material::{Material, Texture};
 use crate::scene::mesh::{Mesh, append, swaps_corners};
 use crate::scene::{Emitter, primitives};
 use crate::{Error, Result};
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat4, DVec3};
 use std::sync::Arc;
 
 const KNOWN: &str = "obj, ply, serialized, rectangle, cube, sphere, disk, cylinder, merge, shapegroup, instance";
@@ -32,10 +32,17 @@ impl<'a> Builder<'a> {
         };
         let (mesh, to_world) = match round {
             Some((kind, to_world, cells)) => (Ok(kind.mesh(cells)), to_world),
+            None if node.plugin == "sphere" => (self.mesh(p), uniform(&self.placed(p)?)),
             None => (self.mesh(p), self.placed(p)?),
         };
+        if node.plugin == "sphere" && is_stretched(&self.placed(p)?) {
+            p.warn(
+                p.at("to_world").warning("a sphere keeps its shape, as in Mitsuba: it is scaled as along x in all directions"),
+            );
+        }
         // Mitsuba takes a mirrored sphere for one of negative radius, and its other shapes not.
-        let inside_out = node.plugin == "sphere" && p.transform("to_world")?.determinant() < 0.0;
+        let mirrored = p.transform("to_world")?.determinant() < 0.0;
+        let inside_out = node.plugin == "sphere" && mirrored != (p.f32("radius", 1.0)? < 0.0);
         let flip = p.bool("flip_normals", false)? != inside_out;
         let face = p.bool("face_normals", false)?;
         // An instance that mirrors takes the sides with it; where the file has normals, `append` does so anyway.
@@ -57,6 +64,12 @@ impl<'a> Builder<'a> {
         self.current = None;
         let emitter = self.or_left_out(emitter, "its light is left out").map(Option::flatten);
         let (mesh, (material, emitter)) = Error::both(mesh, Error::both(material, emitter))?;
+        if mesh.triangles.is_empty() {
+            params.warn(node.at.warning(format!("\"{name}\" has no faces: nothing of it is seen")));
+            params.finish(&mut self.scene.warnings);
+            emitter.map(|_| self.scene.emitters.pop());
+            return Ok(());
+        }
         params.finish(&mut self.scene.warnings);
         let g = &mut self.scene.geometry;
         // A bit of a triangle's index is the tree's.
@@ -90,8 +103,8 @@ impl<'a> Builder<'a> {
             "cube" => primitives::cube(),
             "disk" => primitives::disk(),
             "sphere" => {
-                let center = p.vector("center")?.unwrap_or(Vec3::ZERO);
-                primitives::sphere(center, p.positive("radius", 1.0)?)
+                let (center, radius) = sphere(p)?;
+                primitives::sphere(center.as_vec3(), radius as f32)
             }
             "cylinder" => {
                 let (p0, p1, radius) = cylinder(p)?;
@@ -117,7 +130,7 @@ impl<'a> Builder<'a> {
 
     fn area_emitter(&mut self, node: &'a Node) -> Result<u32> {
         if node.plugin != "area" {
-            return Err(node.at.error(format!("found the emitter \"{}\" in a shape, expected area", node.plugin)));
+            return Err(node.at.unsupported(format!("found the emitter \"{}\" in a shape, expected area", node.plugin)));
         }
         let mut params = self.params(node);
         params.accept(&["sampling_weight"]);

@@ -21,6 +21,12 @@ impl<'a> Builder<'a> {
         self.textured_within(params, name, default, 0)
     }
 
+    /// A number that may be textured. As Mitsuba takes them: a colour counts by the mean of its channels (a bitmap's pixels by
+    /// their luminance), and a checkerboard has its two values the other way round than as a colour.
+    pub(super) fn scalar(&mut self, params: &mut Params<'a>, name: &str, default: f32) -> Result<Texture> {
+        Ok(as_number(self.textured(params, name, default)?))
+    }
+
     fn textured_within(&mut self, params: &mut Params<'a>, name: &str, default: f32, depth: usize) -> Result<Texture> {
         let Some(p) = params.get(name) else { return Ok(Texture::Constant(Rgb::splat(default))) };
         if let Some(color) = params.color_of(p)? {
@@ -87,6 +93,17 @@ impl<'a> Builder<'a> {
         };
         params.finish(&mut self.scene.warnings);
         Ok(texture)
+    }
+}
+
+fn as_number(texture: Texture) -> Texture {
+    match texture {
+        Texture::Constant(c) => Texture::Constant(Rgb::splat(c.element_sum() / 3.0)),
+        Texture::Checkerboard { colors, to_uv } => {
+            let [a, b] = *colors;
+            Texture::Checkerboard { colors: Box::new([as_number(b), as_number(a)]), to_uv }
+        }
+        other => other,
     }
 }
 
