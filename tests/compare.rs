@@ -53,6 +53,8 @@ fn a_rendered_frame_measures_as_in_scikit_image() {
     }
     let page = std::fs::read_to_string(dir.path().join("index.html")).unwrap();
     assert!(page.contains("rmse_rgb"));
+    let values = std::fs::read_to_string(dir.path().join("images/0000_values.js")).unwrap();
+    assert!(values.starts_with("reprobeValues(0, \"iVBOR") && page.contains("function reprobeValues(number, png)"));
     for kind in ["image", "reference", "difference", "dssim", "flip"] {
         let picture = image::open(dir.path().join(format!("images/0000_{kind}.png"))).unwrap();
         assert_eq!((picture.width(), picture.height()), (80, 64), "{kind}");

@@ -9,6 +9,8 @@ pub mod report;
 pub mod rmse;
 pub mod ssim;
 pub mod temporal;
+pub mod values;
+mod view;
 pub mod without_noise;
 
 use crate::base::math::Rgb;

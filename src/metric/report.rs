@@ -1,9 +1,10 @@
 //! `metrics.json` and `index.html`: the numbers for programs, and a page that shows frames, reference and error side by side.
 
 use super::without_noise::WithoutNoise;
-use super::{Comparison, Metrics, Raster, flip};
+use super::{Comparison, Metrics, Raster, flip, view};
 use crate::io::Provenance;
 use crate::{Error, Result};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use serde::Serialize;
 
@@ -63,16 +64,31 @@ impl Report {
         text
     }
 
-    /// `index.html`: one page without outside resources; pictures are beside it, at [`Picture::path`]. `titles` name the
-    /// image and the reference.
+    /// `index.html`: one page without outside resources; pictures are beside it, at [`Picture::path`], and their values, at
+    /// [`values::path`](super::values::path). `titles` name the image and the reference.
     pub fn html(&self, titles: [&str; 2]) -> Result<String> {
         let parameters = &self.provenance.parameters;
-        let data = serde_json::json!({"frames": self.frames, "mean": self.mean, "titles": titles, "parameters": parameters});
-        let data = serde_json::to_string(&data).map_err(|e| Error::Request(format!("report: {e}")))?;
-        // "</script>" in a name must not end the script; JSON allows this escape.
-        let data = data.replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029");
-        Ok(include_str!("report.html").replace("{\"data\": \"goes here\"}", &data))
+        let data = serde_json::json!({
+            "frames": self.frames, "mean": self.mean, "titles": titles, "parameters": parameters,
+            "gain": DIFFERENCE_GAIN, "colours": colours(),
+        });
+        view::page(include_str!("report.html"), &data)
     }
+}
+
+/// Colours of the error maps from the least error to the greatest, as CSS has them: for the bar below a map.
+fn colours() -> Vec<String> {
+    let steps: Vec<f32> = (0..=16).map(|i| i as f32 / 16.0).collect();
+    flip::magma(&steps).chunks_exact(3).map(|c| format!("rgb({}, {}, {})", c[0], c[1], c[2])).collect()
+}
+
+/// Three bytes a pixel as a PNG file.
+pub(super) fn png(pixels: &[u8], [width, height]: [usize; 2]) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
+        .write_image(pixels, width as u32, height as u32, ExtendedColorType::Rgb8)
+        .map_err(|e| Error::Request(format!("PNG of {width} x {height}: {e}")))?;
+    Ok(bytes)
 }
 
 /// The pictures of a frame in the report.
@@ -90,7 +106,7 @@ pub enum Picture {
     Flip,
 }
 
-/// Brightens the difference picture, as a tenth of the display's range is already a gross error. `report.html` tells it.
+/// Brightens the difference picture, as a tenth of the display's range is already a gross error. The bar below the map tells it.
 pub const DIFFERENCE_GAIN: f32 = 4.0;
 
 impl Picture {
@@ -123,11 +139,7 @@ impl Picture {
             Self::Dssim => flip::magma(&comparison.maps.dssim),
             Self::Flip => flip::magma(&comparison.maps.flip),
         };
-        let mut bytes = Vec::new();
-        image::codecs::png::PngEncoder::new(&mut bytes)
-            .write_image(&pixels, size[0] as u32, size[1] as u32, ExtendedColorType::Rgb8)
-            .map_err(|e| Error::Request(format!("PNG of {} x {}: {e}", size[0], size[1])))?;
-        Ok(bytes)
+        png(&pixels, size)
     }
 }
 
@@ -160,6 +172,21 @@ mod tests {
     fn a_name_cannot_break_out_of_the_page() {
         let html = report(&["</script><script>alert(1)"]).html(["a", "b"]).unwrap();
         assert!(!html.contains("</script><script>alert") && html.contains("\\u003c/script>\\u003cscript>alert(1)"));
-        assert!(!html.contains("goes here") && !html.contains("http"), "self-contained");
+        view::tests::is_usable_by_all(&html);
+    }
+
+    #[test]
+    fn the_bar_has_the_colours_and_the_range_of_the_maps() {
+        let html = report(&["0000"]).html(["a", "b"]).unwrap();
+        assert!(
+            html.contains("\"gain\":4.0") && html.contains("[\"difference\", 1 / data.gain,"),
+            "the bar of the difference ends at 0.25"
+        );
+        let ends = flip::magma(&[0.0, 1.0]);
+        let colours = colours();
+        for (colour, end) in [(&colours[0], &ends[..3]), (&colours[16], &ends[3..])] {
+            assert_eq!(*colour, format!("rgb({}, {}, {})", end[0], end[1], end[2]));
+            assert!(html.contains(colour.as_str()));
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::markdown::layer_title;
 use super::{COLUMNS, Costs, Evaluation};
+use crate::metric::view;
 use crate::{Error, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -71,9 +72,7 @@ pub fn html(evaluation: &Evaluation, costs: &Costs, shown: &BTreeMap<String, Sho
     let data = json!({
         "evaluation": evaluation, "costs": costs, "pictures": layers, "verdicts": verdicts, "titles": titles, "columns": COLUMNS,
     });
-    // "</script>" in a name must not end the script; JSON allows this escape.
-    let data = data.to_string().replace('<', "\\u003c");
-    Ok(include_str!("page.html").replace("{\"data\": \"goes here\"}", &data))
+    view::page(include_str!("page.html"), &data)
 }
 
 #[cfg(test)]
@@ -91,7 +90,7 @@ mod tests {
         let page = html(&evaluation, &costs, &[("glossy".to_owned(), shown)].into()).unwrap();
         assert!(page.contains(&STANDARD.encode(&frame)));
         assert!(!page.contains("</script>theirs") && page.contains("\\u003c/script>theirs"));
-        assert!(!page.contains("goes here") && !page.contains("http"), "self-contained");
+        view::tests::is_usable_by_all(&page);
         let decoded = image::load_from_memory(&frame).unwrap().to_rgb8();
         assert!((decoded.width(), decoded.height()) == (8, 4) && decoded.pixels().all(|p| p.0.iter().all(|c| c.abs_diff(7) < 3)));
     }

@@ -5,7 +5,7 @@ use crate::io::provenance::hash_file;
 use crate::io::{ExrImage, Provenance, atomic, json};
 use crate::metric::report::{FrameMetrics, Picture, Report};
 use crate::metric::without_noise::without_noise;
-use crate::metric::{Metrics, Raster, compare, ssim};
+use crate::metric::{Metrics, Raster, compare, ssim, values};
 use crate::plan::option::stage;
 use crate::plan::views::FrameList;
 use crate::plan::{Context, Outcome};
@@ -138,6 +138,8 @@ impl Compare {
         for picture in Picture::ALL {
             atomic::write(&self.output.join(picture.path(index)), &picture.png(&comparison)?)?;
         }
+        let values = values::script(index, [&a, &b], &comparison)?;
+        atomic::write(&self.output.join(values::path(index)), values.as_bytes())?;
         let mut files = vec![fa.clone(), fb.clone()];
         let mut frame = FrameMetrics { name: pair.name.clone(), metrics: comparison.metrics, without_noise: None };
         if let Some(second) = &self.second_reference {
