@@ -4,6 +4,7 @@ mod cases;
 mod images;
 mod materials;
 mod meshes;
+mod sunsky;
 mod text;
 mod unsupported;
 
