@@ -1,4 +1,4 @@
-// Environments: lat-long images, looked up and sampled, and constant ones. Twin: src/transport/envmap.rs.
+// Environments: lat-long images, looked up and sampled, constant ones, and suns. Twins: src/transport/envmap.rs, src/transport/sun.rs.
 
 // #include "shared/texture.wgsl"
 // #include "shared/microfacet.wgsl"
@@ -18,12 +18,19 @@ struct Sky {
 }
 
 fn is_constant(e: u32) -> bool {
-    return environment_image(e).width == 0u;
+    return environment_image(e).width == 0u && environment_f32(e, ENVIRONMENT_SCALE) == 0.0;
+}
+
+fn is_sun(e: u32) -> bool {
+    return environment_image(e).width == 0u && environment_f32(e, ENVIRONMENT_SCALE) > 0.0;
 }
 
 fn environment_eval(e: u32, d: vec3<f32>) -> vec3<f32> {
     if is_constant(e) {
         return environment_vec3(e, ENVIRONMENT_COLOR);
+    }
+    if is_sun(e) {
+        return select(vec3(0.0), sun_radiance(e, d), sun_holds(e, d));
     }
     return envmap_radiance(e, envmap_place(e, envmap_lat_long(e, d)));
 }
@@ -32,6 +39,9 @@ fn environment_pdf(e: u32, d: vec3<f32>) -> f32 {
     if is_constant(e) {
         return 0.25 * FRAC_1_PI;
     }
+    if is_sun(e) {
+        return select(0.0, sun_density(e), sun_holds(e, d));
+    }
     let uv = envmap_lat_long(e, d);
     return envmap_density(e, envmap_place(e, uv)) / lat_long_jacobian(uv.y);
 }
@@ -39,6 +49,9 @@ fn environment_pdf(e: u32, d: vec3<f32>) -> f32 {
 fn environment_sample(e: u32, v: vec2<f32>) -> Sky {
     if is_constant(e) {
         return Sky(direction(1.0 - 2.0 * v.y, v.x), 0.25 * FRAC_1_PI, environment_vec3(e, ENVIRONMENT_COLOR));
+    }
+    if is_sun(e) {
+        return sun_sample(e, v);
     }
     let cells = envmap_cells(e);
     let row = pick(environment_u32(e, ENVIRONMENT_ROW_SUMS), cells.y, v.y);
@@ -54,6 +67,33 @@ fn environment_sample(e: u32, v: vec2<f32>) -> Sky {
     let local = direction_from_lat_long(uv);
     let d = normalize_or(environment_rotation(e, ENVIRONMENT_WORLD_FROM_LOCAL) * local, vec3(0.0, 1.0, 0.0));
     return Sky(d, envmap_density(e, place) / lat_long_jacobian(uv.y), envmap_radiance(e, place));
+}
+
+fn sun_sample(e: u32, v: vec2<f32>) -> Sky {
+    let below_tip = v.y * environment_f32(e, ENVIRONMENT_SCALE);
+    let r = sqrt(max(below_tip * (2.0 - below_tip), 0.0));
+    let local = vec3(r * cos(v.x * TAU), r * sin(v.x * TAU), 1.0 - below_tip);
+    let d = to_world(frame_from_normal(sun_middle(e)), local);
+    return Sky(d, sun_density(e), sun_radiance(e, d));
+}
+
+// From a direction within the disc; black below the plane that it stands on.
+fn sun_radiance(e: u32, d: vec3<f32>) -> vec3<f32> {
+    let up = environment_vec3(e, ENVIRONMENT_WORLD_FROM_LOCAL + 4u);
+    return select(vec3(0.0), environment_vec3(e, ENVIRONMENT_COLOR), dot(d, up) >= 0.0);
+}
+
+fn sun_holds(e: u32, d: vec3<f32>) -> bool {
+    let off = d - sun_middle(e);
+    return dot(off, off) <= 2.0 * environment_f32(e, ENVIRONMENT_SCALE);
+}
+
+fn sun_middle(e: u32) -> vec3<f32> {
+    return environment_vec3(e, ENVIRONMENT_WORLD_FROM_LOCAL + 8u);
+}
+
+fn sun_density(e: u32) -> f32 {
+    return 0.5 * FRAC_1_PI / environment_f32(e, ENVIRONMENT_SCALE);
 }
 
 // Columns of cells, and rows: one between each two of pixels.

@@ -121,7 +121,8 @@ const ENVIRONMENT_ROWS: u32 = 9u;
 // Columns of both rotations, a row each.
 const ENVIRONMENT_WORLD_FROM_LOCAL: u32 = 0u;
 const ENVIRONMENT_LOCAL_FROM_WORLD: u32 = 12u;
-// Of a constant environment, which has an image without width.
+// Of a constant environment and of a sun, which have images without width. A sun has a scale, 1 - cos of its radius; columns 1 and 2 of
+// its first rotation are up and the direction to its middle.
 const ENVIRONMENT_COLOR: u32 = 24u;
 const ENVIRONMENT_SCALE: u32 = 27u;
 const ENVIRONMENT_IMAGE: u32 = 28u;

@@ -348,7 +348,7 @@ fn solids(scene: &Scene) -> Orientation {
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } | Emitter::Projector { position, .. } => {
                 occupied.push(*position)
             }
-            Emitter::Envmap { .. } | Emitter::Constant { .. } | Emitter::Directional { .. } => {}
+            Emitter::Envmap { .. } | Emitter::Constant { .. } | Emitter::Sun { .. } | Emitter::Directional { .. } => {}
         }
     }
     let mut orientation = vec![0; geometry.triangles.len()];

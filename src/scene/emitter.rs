@@ -81,6 +81,17 @@ pub enum Emitter {
         /// Largest angle between `direction` and light, radians.
         cutoff_rad: f32,
     },
+    /// A disc at infinity.
+    Sun {
+        /// Unit direction to its middle.
+        direction: Vec3,
+        /// Unit; nothing shines from below the plane that it stands on.
+        up: Vec3,
+        /// Angle from its middle to its rim, radians.
+        angle_rad: f32,
+        /// Radiance, the same all over.
+        radiance: Rgb,
+    },
     /// Parallel light.
     Directional {
         /// Unit direction in which the light travels.

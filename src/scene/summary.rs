@@ -83,6 +83,7 @@ fn kind(emitter: &Emitter) -> &'static str {
         Emitter::Spot { .. } => "spot",
         Emitter::Projector { .. } => "projector",
         Emitter::Directional { .. } => "directional",
+        Emitter::Sun { .. } => "sun",
     }
 }
 

@@ -9,6 +9,7 @@ use super::envmap::Envmap;
 use super::light_sample::LightSample;
 use super::light_tree::{LightBounds, LightTree, Receiver};
 use super::round_light;
+use super::sun::Sun;
 use crate::base::math::{Rgb, luminance};
 use crate::material::{Surface, Texture};
 use crate::scene::normals::unit_normal;
@@ -56,6 +57,7 @@ pub(crate) struct LightTriangle {
 pub(crate) enum Environment {
     Map(Envmap),
     Constant(Rgb),
+    Sun(Sun),
 }
 
 impl Lights {
@@ -87,6 +89,9 @@ impl Lights {
                 }
                 Emitter::Constant { radiance: Rgb::ZERO } => {}
                 Emitter::Constant { radiance } => this.environments.push(Environment::Constant(*radiance)),
+                Emitter::Sun { direction, up, angle_rad, radiance } => {
+                    this.environments.extend(Sun::new(*direction, *up, *angle_rad, *radiance).map(Environment::Sun));
+                }
                 Emitter::Directional { .. } => this.suns.push(i as u32),
                 Emitter::Point { position, intensity } => {
                     bounds.push(delta_bounds(*position, *intensity, Vec3::Z, PI, PI));
@@ -274,6 +279,7 @@ impl Environment {
         match self {
             Self::Map(map) => map.eval(d),
             Self::Constant(radiance) => *radiance,
+            Self::Sun(sun) => sun.eval(d),
         }
     }
 
@@ -281,6 +287,7 @@ impl Environment {
     fn sample(&self, v: Vec2) -> (Vec3, f32, Rgb) {
         match self {
             Self::Map(map) => map.sample(v),
+            Self::Sun(sun) => sun.sample(v),
             Self::Constant(radiance) => {
                 let z = 1.0 - 2.0 * v.y;
                 let (sin_phi, cos_phi) = (v.x * 2.0 * PI).sin_cos();
@@ -294,6 +301,7 @@ impl Environment {
         match self {
             Self::Map(map) => map.pdf(d),
             Self::Constant(_) => 0.25 / PI,
+            Self::Sun(sun) => sun.pdf(d),
         }
     }
 }
@@ -330,7 +338,7 @@ fn sample_delta(emitter: &Emitter, p: Vec3) -> Option<LightSample> {
             let scale = PI * to_point.length().powi(3) / (local.z * local.z * direction.dot(to_point));
             (*position, image.texture.eval(uv), scale)
         }
-        Emitter::Area { .. } | Emitter::Envmap { .. } | Emitter::Constant { .. } => return None,
+        Emitter::Area { .. } | Emitter::Envmap { .. } | Emitter::Constant { .. } | Emitter::Sun { .. } => return None,
     };
     let distance = point.distance(p);
     let wi = (point - p).try_normalize()?;

@@ -11,6 +11,7 @@ pub mod path;
 mod round_light;
 pub mod sampler;
 mod steps;
+mod sun;
 pub mod world;
 
 pub use sampler::Sampler;

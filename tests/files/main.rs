@@ -5,6 +5,7 @@ mod images;
 mod materials;
 mod meshes;
 mod odd;
+mod sunsky;
 mod text;
 mod unsupported;
 

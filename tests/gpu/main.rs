@@ -85,6 +85,7 @@ const TWICE: &[Test] = tests![
     denoise::guides_of_every_model_are_the_cpus,
     frames::frames_are_the_cpus,
     paths::every_model_and_emitter_is_the_cpus,
+    paths::a_sky_and_its_sun_are_the_cpus,
     paths::layers_and_full_images_are_the_cpus,
     rays::a_probe_sees_the_same_through_either,
     rays::a_scene_without_surfaces_has_no_hits,

@@ -126,6 +126,31 @@ pub fn every_model_and_emitter_is_the_cpus(device: &Device) {
     check("zoo", &gpu, &path_trace(&world, &camera, &params, 1, 0, &Silent), 0.05);
 }
 
+/// Seen by the camera too, at the edge of the horizon.
+pub fn a_sky_and_its_sun_are_the_cpus(device: &Device) {
+    let gpu = device.gpu();
+    let folder = tempfile::tempdir().unwrap();
+    let text = "<scene version='3.0.0'>
+        <sensor type='perspective'><float name='fov' value='60'/>
+          <transform name='to_world'><lookat origin='0,1,5' target='0,0.8,0' up='0,1,0'/></transform>
+          <film type='hdrfilm'><integer name='width' value='48'/><integer name='height' value='32'/></film></sensor>
+        <emitter type='sunsky'><transform name='to_world'><rotate x='1' angle='-90'/></transform>
+          <vector name='sun_direction' x='0.2' y='0.05' z='-1'/><float name='sun_aperture' value='8'/></emitter>
+        <shape type='rectangle'><transform name='to_world'><rotate x='1' angle='-90'/><scale value='4'/></transform>
+          <bsdf type='diffuse'/></shape>
+        <shape type='sphere'><float name='radius' value='0.7'/><point name='center' x='-1' y='0.7' z='0'/>
+          <bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf></shape>
+        <shape type='sphere'><float name='radius' value='0.7'/><point name='center' x='1' y='0.7' z='1'/><bsdf type='diffuse'/></shape></scene>";
+    let file = folder.path().join("sky.xml");
+    std::fs::write(&file, text).unwrap();
+    let world = World::new(reprobe::exchange::load(&file, &Default::default()).unwrap());
+    let camera = world.scene.sensor.clone().unwrap();
+    let params = PathTraceParams { spp: 8, ..PathTraceParams::default() };
+    let scene = Arc::new(GpuScene::new(gpu, &world).unwrap());
+    let gpu = PathTracer::new(scene, &params.path, true).unwrap().layers(&camera, params.spp, 1, 0, &Silent).unwrap();
+    check("sky", &gpu, &path_trace(&world, &camera, &params, 1, 0, &Silent), 0.05);
+}
+
 pub fn a_model_that_the_gpu_lacks_is_named(device: &Device) {
     let gpu = device.gpu();
     let folder = tempfile::tempdir().unwrap();

@@ -6,6 +6,7 @@ pub mod ior;
 pub mod json;
 pub mod load;
 pub mod params;
+pub mod sky;
 pub mod spectrum;
 pub mod spectrum_plugin;
 pub mod transform;

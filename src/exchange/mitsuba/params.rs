@@ -158,12 +158,26 @@ impl<'a> Params<'a> {
         }
     }
 
+    /// The colour of a surface, whatever plugin it is a parameter of.
+    pub fn reflectance(&mut self, name: &str, default: Rgb) -> Result<Rgb> {
+        let Some(p) = self.get(name) else { return Ok(default) };
+        let color = self.color_seen(p, false)?.ok_or_else(|| wrong(p, self.node, "a colour"))?;
+        match color.min_element() >= 0.0 && color.max_element() <= 1.0 {
+            true => Ok(color),
+            false => Err(p.at.error(format!("{name} = {color}: expected 0 to 1"))),
+        }
+    }
+
     /// A parameter as a colour, where it is one. An emitter's spectra keep their white, a surface's are seen under D65.
     ///
     /// Numbers below 0 are Mitsuba's choice: a reflectance given as RGB may not be; a metal's eta and k may, and count by their size;
     /// anything else is taken for 0 (ours: Mitsuba goes on with it).
     pub fn color_of(&mut self, p: &'a Param) -> Result<Option<Rgb>> {
-        let emitter = self.node.kind == Kind::Emitter;
+        self.color_seen(p, self.node.kind == Kind::Emitter)
+    }
+
+    /// A parameter as a colour, an emitter's or a surface's.
+    fn color_seen(&mut self, p: &'a Param, emitter: bool) -> Result<Option<Rgb>> {
         let color = match &p.value {
             Value::Integer(_) | Value::Float(_) => number_of(p, self.node)?.map(Rgb::splat),
             Value::Uniform(x) => Some(if emitter { EQUAL_ENERGY_WHITE } else { Rgb::ONE } * *x as f32),

@@ -8,7 +8,7 @@ use crate::transport::World;
 use crate::transport::light_tree::WIDTH;
 use crate::transport::lights::{Environment, Near};
 use bytemuck::{Pod, Zeroable};
-use glam::Mat3;
+use glam::{Mat3, Vec3};
 
 /// An emitter, as the constants `EMITTER_...` of scene.wgsl have it.
 #[repr(C)]
@@ -101,7 +101,9 @@ pub(crate) fn emitters(world: &World, textures: &mut Textures, words: &mut Words
         },
         // Refused before it comes here.
         Emitter::Projector { .. } => GpuEmitter::default(),
-        Emitter::Envmap { .. } | Emitter::Constant { .. } => GpuEmitter { kind: AT_INFINITY, ..GpuEmitter::default() },
+        Emitter::Envmap { .. } | Emitter::Constant { .. } | Emitter::Sun { .. } => {
+            GpuEmitter { kind: AT_INFINITY, ..GpuEmitter::default() }
+        }
     };
     world.scene.emitters.iter().enumerate().map(of).collect()
 }
@@ -123,6 +125,12 @@ pub(crate) fn environments(world: &World, textures: &mut Textures, words: &mut W
     let columns = |m: &Mat3| m.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]);
     let of = |environment: &Environment| match environment {
         Environment::Constant(color) => GpuEnvironment { color: color.to_array(), ..GpuEnvironment::default() },
+        Environment::Sun(sun) => GpuEnvironment {
+            world_from_local: columns(&Mat3::from_cols(Vec3::ZERO, sun.up, sun.direction())),
+            color: sun.radiance.to_array(),
+            scale: sun.height,
+            ..GpuEnvironment::default()
+        },
         Environment::Map(map) => GpuEnvironment {
             world_from_local: columns(&map.world_from_local),
             local_from_world: columns(&map.local_from_world),

@@ -11,6 +11,9 @@ use crate::scene::Emitter;
 use crate::scene::emitter::Pattern;
 use glam::{Affine3A, Mat4, Vec2, Vec3};
 
+/// What there is.
+const KNOWN: &str = "area, envmap, constant, sunsky, point, spot, directional, projector";
+
 impl<'a> Builder<'a> {
     /// Adds an emitter.
     pub(super) fn emitter(&mut self, node: &'a Node) -> Result<()> {
@@ -19,10 +22,10 @@ impl<'a> Builder<'a> {
         p.accept(&["sampling_weight"]);
         // Lengths grow by the unit scale; so must intensities, for the same irradiance.
         let area_scale = self.unit_scale * self.unit_scale;
-        if matches!(node.plugin.as_str(), "envmap" | "constant") {
+        if matches!(node.plugin.as_str(), "envmap" | "constant" | "sunsky" | "sky" | "sun") {
             self.environments += 1;
             if self.environments > 1 {
-                return Err(node.at.error("a second environment: expected one envmap or constant"));
+                return Err(node.at.error("a second environment: expected one envmap, constant or sunsky"));
             }
         }
         let emitter = match node.plugin.as_str() {
@@ -51,12 +54,12 @@ impl<'a> Builder<'a> {
                 Emitter::Directional { direction, irradiance }
             }
             "area" => return self.area_by_itself(node),
-            "sky" | "sun" | "sunsky" | "timed_sunsky" => {
-                let message =
-                    format!("{}: the sun and sky models are not read: render them with Mitsuba to an envmap", node.plugin);
+            "sunsky" | "sky" | "sun" => return self.sunsky(params),
+            "timed_sunsky" => {
+                let message = "timed_sunsky: a sun that moves while the shutter is open is not supported: a sunsky is";
                 return Err(node.at.unsupported(message));
             }
-            _ => return Err(Self::unknown(node, "emitter", "area, envmap, constant, point, spot, directional, projector")),
+            _ => return Err(Self::unknown(node, "emitter", KNOWN)),
         };
         params.finish(&mut self.scene.warnings);
         self.scene.emitters.push(emitter);
@@ -143,7 +146,7 @@ fn axis(p: &Params, to_world: &Mat4) -> Result<Vec3> {
     direction.ok_or_else(|| p.at("to_world").error("the direction has no length"))
 }
 
-fn not_negative(p: &mut Params, name: &str, default: f32) -> Result<f32> {
+pub(super) fn not_negative(p: &mut Params, name: &str, default: f32) -> Result<f32> {
     let x = p.f32(name, default)?;
     if x >= 0.0 { Ok(x) } else { Err(p.at(name).error(format!("{name} = {x}: expected at least 0"))) }
 }

@@ -8,6 +8,7 @@ mod integrator;
 mod round;
 mod sensor;
 mod shape;
+mod sunsky;
 mod texture;
 
 use super::assets::{Assets, ids, walk};
