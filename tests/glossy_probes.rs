@@ -19,7 +19,7 @@ use reprobe::surface::{CurvatureMap, CurvatureParams, curvature};
 use reprobe::transport::World;
 use reprobe::view::composite::downsample;
 use reprobe::view::gbuffer::{GBuffer, Pixel, gbuffer};
-use reprobe::view::mirror::{Reflected, mirror_hit, mirror_pass};
+use reprobe::view::mirror::{Reflected, mirror_direction, mirror_hit, mirror_pass};
 use reprobe::view::mirror_light::{add_mirrored, mirror_light_pass};
 
 /// A wall of a room from -2 to 2 in x and y and 0 to 4 in z, as Mitsuba's rectangle turned and moved, glowing in its own colour.
@@ -273,6 +273,49 @@ fn what_perfect_mirrors_show_of_lamps_needs_no_texels() {
     let (plain, lit) = (wrong(&gathered(false)), wrong(&add_mirrored(&gathered(true), &shown)));
     assert!(plain.1 > 500 && plain.0 > 500, "{plain:?}: nothing to be cured");
     assert_eq!(lit.0, 0, "of {}", lit.1);
+}
+
+#[test]
+fn a_room_of_mirrors_shows_its_lamp_from_mirror_to_mirror() {
+    let mirror = r#"<bsdf type="twosided"><bsdf type="conductor"><string name="material" value="none"/>
+        <rgb name="specular_reflectance" value="0.8"/></bsdf></bsdf>"#;
+    let xml = format!(
+        r#"<scene version="3.0.0"><shape type="cube">{mirror}</shape><shape type="rectangle"><transform name="to_world">
+        <scale value="0.3"/><rotate x="1" angle="90"/><translate value="0.1,0.95,-0.1"/></transform>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
+        <emitter type="area"><rgb name="radiance" value="10"/></emitter></shape></scene>"#
+    );
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("mirrors.xml");
+    std::fs::write(&path, xml).unwrap();
+    let scene = load(&path, &LoadOptions::default()).unwrap();
+    let curvature = curvature(&scene.geometry, &CurvatureParams::default(), &Silent);
+    let world = World::new(scene);
+    let atlas = Atlas::build(&world.scene.geometry, &|_| true, &AtlasParams { texel: Some(0.5), ..Default::default() }).unwrap();
+    let dark = vec![Vec3::ZERO; (atlas.size[0] * atlas.size[1]) as usize];
+    let map = sides(&world.scene.geometry, &atlas, dark, None);
+
+    let camera = Camera::look_at(Vec3::new(0.4, -0.2, 0.7), Vec3::new(-0.3, 0.1, -0.5), Vec3::Y, 1.0, [64, 48]);
+    let view = gbuffer(&world, &curvature, &camera);
+    let (_, shown) = mirror_light_pass(&world, &map, &view);
+    // Each ray to its end: what is left after a hundred mirrors is nothing.
+    let to_the_end = |p: &Pixel| {
+        let (mut surface, mut wo, mut throughput) = (p.surface, p.wo, 0.8);
+        for _ in 0..100 {
+            let ray = surface.spawn(mirror_direction(&surface, wo));
+            let hit = world.intersect(&ray).unwrap();
+            if hit.emitter.is_some() {
+                return throughput * world.lights.emitted(&world.scene, &hit, -ray.d).x;
+            }
+            (surface, wo, throughput) = (hit, -ray.d, 0.8 * throughput);
+        }
+        0.0
+    };
+    let mirrors = || view.pixels.iter().zip(&shown).filter_map(|(p, shown)| p.as_ref().map(|p| (p, shown)));
+    let (shown, all) =
+        mirrors().filter(|(p, _)| p.alpha == Some(0.0)).fold((0.0, 0.0), |(a, b), (p, shown)| (a + shown.x, b + to_the_end(p)));
+    // 0.8 to the power of 17 is 2 %.
+    assert!(shown <= all && shown > 0.95 * all, "{shown} of {all}");
 }
 
 #[test]

@@ -106,6 +106,57 @@ fn run_makes_frames_and_a_report_and_threads_do_not_change_a_bit() {
     }
 }
 
+/// The scene and its path with all lengths multiplied by `scale`.
+fn scaled(f: &Folder, scale: f64) {
+    let number = |x: &str| (x.trim().parse::<f64>().unwrap() * scale).to_string();
+    let vector = |x: &str| x.split(',').map(number).collect::<Vec<_>>().join(", ");
+    let shapes = SCENE.replace("</transform>", &format!("<scale value=\"{scale}\"/></transform>"));
+    let look = |name: &str, text: &str| {
+        let (before, rest) = text.split_once(&format!("{name}=\"")).unwrap();
+        let (value, after) = rest.split_once('"').unwrap();
+        format!("{before}{name}=\"{}\"{after}", vector(value))
+    };
+    // The camera's own transform is a frame without a scale.
+    let camera = shapes.replacen(&format!("<scale value=\"{scale}\"/>"), "", 1);
+    let scene = look("target", &look("origin", &camera));
+    let ball = format!("<transform name=\"to_world\"><scale value=\"{scale}\"/></transform><bsdf type=\"conductor\"/>");
+    std::fs::write(f.at("scene.xml"), scene.replace("<bsdf type=\"conductor\"/>", &ball)).unwrap();
+    let mut path: Value = serde_json::from_str(PATH).unwrap();
+    for frame in path["frames"].as_array_mut().unwrap() {
+        for end in ["origin", "target"] {
+            for x in frame[end].as_array_mut().unwrap() {
+                *x = (x.as_f64().unwrap() * scale).into();
+            }
+        }
+    }
+    std::fs::write(f.at("path.json"), path.to_string()).unwrap();
+}
+
+#[test]
+fn a_room_in_any_unit_looks_as_in_metres() {
+    let frames = |scale: f64| {
+        let f = Folder::new();
+        scaled(&f, scale);
+        let output = f.reprobe(&format!("{RUN} --frames 0"));
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert_eq!(text(&output.stderr).contains("--unit-scale"), scale != 1.0, "{}", text(&output.stderr));
+        ["frames", "reference"].map(|folder| {
+            let image = ExrImage::read(&f.at("out").join(folder).join("0000.exr")).unwrap();
+            image.rgb(Path::new(""), "glossy").unwrap()
+        })
+    };
+    let metres = frames(1.0);
+    for scale in [1e-6, 1e5] {
+        for (a, b) in metres.iter().zip(frames(scale)) {
+            // Lengths are rounded in the last place: few paths take another turn.
+            let differs = a.iter().zip(&b).filter(|(a, b)| (**a - **b).length() > 1e-3 * (1.0 + a.length())).count();
+            let mean = |pixels: &[glam::Vec3]| pixels.iter().map(|p| p.element_sum()).sum::<f32>();
+            assert!(differs < a.len() / 20, "{scale}: {differs} of {} pixels", a.len());
+            assert!((mean(&b) / mean(a) - 1.0).abs() < 0.01, "{scale}: {} to {}", mean(&b), mean(a));
+        }
+    }
+}
+
 #[test]
 fn run_goes_through_with_the_papers_text() {
     let f = Folder::new();

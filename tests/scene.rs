@@ -276,8 +276,9 @@ fn unit_scale_keeps_the_picture_and_scales_all_lengths() {
         <transform name='to_world'><translate x='1' z='-5'/></transform></sensor><shape type='sphere'/>
         <emitter type='point'><point name='position' value='0 3 0'/></emitter></scene>";
     let dir = folder();
-    let [one, hundred] =
-        [1.0, 100.0].map(|unit_scale| load_in(&dir, "s.xml", text, &LoadOptions { unit_scale, ..Default::default() }).unwrap());
+    let [one, hundred] = [1.0, 100.0].map(|unit_scale| {
+        load_in(&dir, "s.xml", text, &LoadOptions { unit_scale: Some(unit_scale), ..Default::default() }).unwrap()
+    });
     assert!((hundred.geometry.bounds().1 - one.geometry.bounds().1 * 100.0).length() < 1e-3);
     let [near, far] = [&one, &hundred].map(|s| s.sensor.clone().unwrap());
     assert_eq!(far.position(), near.position() * 100.0);

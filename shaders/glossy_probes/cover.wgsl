@@ -23,7 +23,7 @@ const DEPTH_TOLERANCE: f32 = 0.02;
 const SHARP_ALPHA: f32 = 0.05;
 const REFLECTED_TOLERANCE: f32 = 0.05;
 // Twin: view::mirror_light::PERFECT.
-const PERFECT_RAYS: u32 = 4u;
+const PERFECT_RAYS: u32 = 16u;
 const GOLDEN_RATIO: f32 = 0.618034;
 
 // The kernel begins with a copy: see scene.wgsl.

@@ -6,6 +6,7 @@ use crate::exchange::{LoadOptions, load};
 use crate::gpu::{Choice, Gpu};
 use crate::scene::Scene;
 use crate::scene::summary::Summary;
+use crate::scene::units::METRES;
 use crate::transport::World;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -30,8 +31,6 @@ impl Listener for Silent {
 
 /// Depth from which on what longer paths carry is not worth a word.
 const LONG_PATH: u32 = 64;
-/// Sizes that scenes in metres have.
-const METRES: std::ops::RangeInclusive<f32> = 0.1..=10_000.0;
 
 /// Says what of a scene does not count for bakes.
 fn warn_of_bakes(scene: &Scene, listener: &dyn Listener) {
@@ -81,10 +80,9 @@ pub struct Outcome {
 }
 
 impl Context {
-    /// A context; the scale must be positive.
+    /// A context; a scale must be positive.
     pub fn new(seed: u32, device: Choice, load: LoadOptions, listener: Arc<dyn Listener>) -> Result<Self> {
-        let unit_scale = load.unit_scale;
-        if !(unit_scale.is_finite() && unit_scale > 0.0) {
+        if let Some(unit_scale) = load.unit_scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
             return Err(Error::Request(format!("--unit-scale {unit_scale}: expected a positive number")));
         }
         Ok(Self { seed, device, load, listener, scene: Arc::default() })

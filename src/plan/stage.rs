@@ -141,8 +141,10 @@ impl Stage {
         list.extend(with!(self, s => s.arguments()));
         let mut option = |name: &str, value: String| list.extend([name.into(), value.into()]);
         option("--seed", cx.seed.to_string());
-        if self.reads_scene() && cx.load.unit_scale != 1.0 {
-            option("--unit-scale", cx.load.unit_scale.to_string());
+        if self.reads_scene()
+            && let Some(scale) = cx.load.unit_scale
+        {
+            option("--unit-scale", scale.to_string());
         }
         if self.uses_gpu() && cx.device != crate::gpu::Choice::Auto {
             option("--device", cx.device.to_string());

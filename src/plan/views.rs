@@ -1,6 +1,5 @@
 //! Which views to render: those of a camera path, or the scene's own sensor's.
 
-use super::Context;
 use crate::scene::{Scene, camera_path};
 use crate::view::View;
 use crate::{Error, Result};
@@ -56,15 +55,9 @@ impl std::str::FromStr for FrameList {
 super::option::text!(FrameList);
 
 /// The views of a camera path, or of the scene's own sensor, at `size` if given (the horizontal field of view stays).
-pub fn views(
-    cx: &Context,
-    scene: &Scene,
-    path: Option<&Path>,
-    size: Option<[u32; 2]>,
-    frames: Option<&FrameList>,
-) -> Result<Vec<View>> {
+pub fn views(scene: &Scene, path: Option<&Path>, size: Option<[u32; 2]>, frames: Option<&FrameList>) -> Result<Vec<View>> {
     let mut cameras = match path {
-        Some(file) => camera_path::load(file, scene.sensor.as_ref(), cx.load.unit_scale)?,
+        Some(file) => camera_path::load(file, scene.sensor.as_ref(), scene.unit_scale.0)?,
         None => {
             let missing = || Error::input(&scene.path, "has no sensor; give a camera path with --path");
             vec![scene.sensor.clone().ok_or_else(missing)?]

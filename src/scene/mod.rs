@@ -11,6 +11,7 @@ pub mod normals;
 pub mod primitives;
 pub mod round;
 pub mod summary;
+pub mod units;
 
 use crate::material::Material;
 use std::path::PathBuf;
@@ -20,7 +21,7 @@ pub use emitter::Emitter;
 pub use geometry::{Geometry, Object};
 pub use round::Round;
 
-/// A loaded scene. Everything is in world space and scene units times `--unit-scale`.
+/// A loaded scene. Everything is in world space and metres: the file's units times [`Self::unit_scale`].
 #[derive(Debug, Default)]
 pub struct Scene {
     /// All triangles of all shapes.
@@ -41,6 +42,8 @@ pub struct Scene {
     pub rr_depth: Option<u32>,
     /// The integrator's `hide_emitters`: cameras see past area lights, and no environment.
     pub hide_emitters: bool,
+    /// What the file's lengths were multiplied by; those of a camera path must be, too.
+    pub unit_scale: units::UnitScale,
     /// [`hash::content`]: what provenance compares.
     pub hash: String,
     /// The file that was loaded.

@@ -23,8 +23,9 @@ pub struct ChainParams {
     pub max_alpha: f32,
 }
 
-/// From perfect mirror to perfect mirror. *Ours*: four, as more reflections fill few pixels.
-pub const PERFECT: ChainParams = ChainParams { rays: 4, max_alpha: 0.0 };
+/// From perfect mirror to perfect mirror. *Ours*: sixteen; what follows comes from probes, which know where the first reflection leads alone,
+/// and a room of mirrors that reflect .8 has a third of its light beyond four. Other scenes end the chain by themselves.
+pub const PERFECT: ChainParams = ChainParams { rays: 16, max_alpha: 0.0 };
 
 /// What a mirror shows.
 #[derive(Debug, Clone, Copy)]

@@ -35,9 +35,10 @@ pub struct Common {
     /// Say more
     #[arg(long, short, global = true, help_heading = HEADING)]
     pub verbose: bool,
-    /// Multiplies all lengths of the scene, to make them metres
-    #[arg(long, global = true, help_heading = HEADING, value_name = "S", default_value_t = 1.0)]
-    pub unit_scale: f32,
+    /// Multiplies all lengths of the scene, to make them metres [default: 1, or a power of ten where
+    /// the scene is less than .1 or more than 10,000 across]
+    #[arg(long, global = true, help_heading = HEADING, value_name = "S")]
+    pub unit_scale: Option<f32>,
     /// Gives a scene parameter a value: NAME=VALUE for `$NAME`
     #[arg(long = "define", short = 'D', global = true, help_heading = HEADING, value_name = "NAME=VALUE")]
     pub defines: Vec<String>,

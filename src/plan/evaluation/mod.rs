@@ -139,7 +139,7 @@ impl Evaluate {
         self.warn_of_noise(cx, &plan)?;
         atomic::sweep(&self.output);
         let world = cx.opaque_world(&self.scene)?;
-        let views = views(cx, &world.scene, Some(&self.path), self.settings.size.map(|s| s.0), self.frames.as_ref())?;
+        let views = views(&world.scene, Some(&self.path), self.settings.size.map(|s| s.0), self.frames.as_ref())?;
         // Before hours of work.
         plan.check_views(&views)?;
         let frames: Vec<u32> = views.iter().map(|v| v.frame).collect();

@@ -158,7 +158,7 @@ impl BakeProbes {
         let inputs = self.inputs(cx)?;
         let scene = &inputs.world.scene;
         let cameras = match &self.for_path {
-            Some(path) => Some(views(cx, scene, Some(path), self.size.map(|s| s.0), self.frames.as_ref())?),
+            Some(path) => Some(views(scene, Some(path), self.size.map(|s| s.0), self.frames.as_ref())?),
             None => None,
         };
         let cameras: Option<Vec<Camera>> = cameras.map(|views| views.into_iter().map(|v| v.camera).collect());

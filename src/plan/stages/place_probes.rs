@@ -77,7 +77,7 @@ impl PlaceProbes {
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
         let world = cx.opaque_world(&self.scene)?;
-        let cameras = self.cameras(&world.scene, cx)?;
+        let cameras = self.cameras(&world.scene)?;
         let (params, density) = (self.reach(), self.density());
         let (lower, upper) = match self.bounds {
             Some(List([x0, y0, z0, x1, y1, z1])) => (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1)),
@@ -111,10 +111,10 @@ impl PlaceProbes {
     }
 
     /// Where the camera stands: along the path, or the scene's own sensor.
-    fn cameras(&self, scene: &Scene, cx: &Context) -> Result<Vec<Vec3>> {
+    fn cameras(&self, scene: &Scene) -> Result<Vec<Vec3>> {
         Ok(match &self.path {
             Some(path) => {
-                camera_path::load(path, scene.sensor.as_ref(), cx.load.unit_scale)?.iter().map(|c| c.position()).collect()
+                camera_path::load(path, scene.sensor.as_ref(), scene.unit_scale.0)?.iter().map(|c| c.position()).collect()
             }
             None => scene.sensor.iter().map(|c| c.position()).collect(),
         })

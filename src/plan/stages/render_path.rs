@@ -220,7 +220,7 @@ impl RenderPath {
         let Resolved { method, parameters } = self.resolve()?;
         let mut timings = Timings::of(method.name);
         let Inputs { world, lightmap, curvature, provenance } = self.inputs(cx, method, &mut timings)?;
-        let views = views(cx, &world.scene, self.path.as_deref(), self.size.map(|s| s.0), self.frames.as_ref())?;
+        let views = views(&world.scene, self.path.as_deref(), self.size.map(|s| s.0), self.frames.as_ref())?;
         refuse_parallel(method, &views)?;
         let (parameters, warnings) = (method.for_scene)(parameters, &world.scene)?;
         warnings.iter().for_each(|w| cx.listener.warn(w));
