@@ -25,6 +25,7 @@ use crate::surface::curvature_file;
 use crate::transport::World;
 use crate::transport::follow::Follow;
 use crate::transport::path::PathParams;
+use crate::view::mirror_light;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde_json::json;
@@ -163,7 +164,8 @@ impl BakeProbes {
         };
         let cameras: Option<Vec<Camera>> = cameras.map(|views| views.into_iter().map(|v| v.camera).collect());
         let served = cameras.as_ref().map(|cameras| self.served(cameras)).transpose()?;
-        let parameters = json!({ "bake": params, "views": served });
+        // How far mirrors hand light on is no parameter, but what is stored depends on it.
+        let parameters = json!({ "bake": params, "views": served, "mirrors": mirror_light::PERFECT.rays });
         let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &parameters)
             .with_input("probes", hash_file(&self.probes)?)
             .with_input("qhmap", hash_file(&ProbeSet::path(&self.qhmap))?);
