@@ -19,6 +19,8 @@ fn compare(a: &Path, b: &Path, out: &Path, more: &[&str]) -> Output {
 fn message(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    // What is begun is told before.
+    let text = text.strip_prefix("compare ...\n").unwrap_or(&text).to_owned();
     assert!(text.starts_with("reprobe: error: ") && text.trim_end().lines().count() == 1, "{text}");
     text
 }

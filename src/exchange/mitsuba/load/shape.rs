@@ -35,15 +35,7 @@ impl<'a> Builder<'a> {
             None if node.plugin == "sphere" => (self.mesh(p), uniform(&self.placed(p)?)),
             None => (self.mesh(p), self.placed(p)?),
         };
-        if node.plugin == "sphere" && is_stretched(&self.placed(p)?) {
-            p.warn(
-                p.at("to_world").warning("a sphere keeps its shape, as in Mitsuba: it is scaled as along x in all directions"),
-            );
-        }
-        // Mitsuba takes a mirrored sphere for one of negative radius, and its other shapes not.
-        let mirrored = p.transform("to_world")?.determinant() < 0.0;
-        let inside_out = node.plugin == "sphere" && mirrored != (p.f32("radius", 1.0)? < 0.0);
-        let flip = p.bool("flip_normals", false)? != inside_out;
+        let flip = p.bool("flip_normals", false)? != (node.plugin == "sphere" && self.is_inside_out(p)?);
         let face = p.bool("face_normals", false)?;
         // An instance that mirrors takes the sides with it; where the file has normals, `append` does so anyway.
         let by_winding = mesh.as_ref().is_ok_and(|m| face || m.normals.is_empty());
@@ -83,6 +75,16 @@ impl<'a> Builder<'a> {
         }
         append(g, mesh, to_world.as_mat4(), flip, face && round.is_none(), name, material, emitter);
         Ok(())
+    }
+
+    /// Whether a sphere's normals point inwards: Mitsuba takes a mirrored one for one of negative radius, and its other shapes not.
+    fn is_inside_out(&self, p: &mut Params<'a>) -> Result<bool> {
+        if is_stretched(&self.placed(p)?) {
+            let message = "a sphere keeps its shape, as in Mitsuba: it is scaled as along x in all directions";
+            p.warn(p.at("to_world").warning(message));
+        }
+        let mirrored = p.transform("to_world")?.determinant() < 0.0;
+        Ok(mirrored != (p.f32("radius", 1.0)? < 0.0))
     }
 
     fn mesh(&mut self, p: &mut Params<'a>) -> Result<Mesh> {
