@@ -137,29 +137,31 @@ pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sam
     keep_finite(incident(world, start, None, params, sampler))
 }
 
-/// [`scattered`] where cameras see no emitters: as in Mitsuba, none behind thin glass either that lets the ray straight through.
+/// [`scattered`] where cameras see no emitters: as in Mitsuba, no environment behind thin glass either that lets the ray straight
+/// through; but lamps there are seen.
 fn past_emitters(world: &World, mut surface: Surface, mut wo: Vec3, params: &PathParams, sampler: &mut Sampler) -> Rgb {
-    let mut throughput = Rgb::ONE;
+    let (mut sum, mut throughput) = (Rgb::ZERO, Rgb::ONE);
     for depth in 0..params.max_depth {
         let bsdf = &world.scene.materials[surface.material as usize].bsdf;
         if !matches!(bsdf, Bsdf::ThinDielectric(_)) {
             let rest = PathParams { max_depth: params.max_depth - depth, ..*params };
-            return throughput * scattered(world, &surface, wo, Query::default(), None, &rest, sampler);
+            return sum + throughput * scattered(world, &surface, wo, Query::default(), None, &rest, sampler);
         }
         let [x, y, lobe, _] = sampler.next_4d();
         let wi = surface.frame.to_local(wo);
-        let Some(sample) = bsdf.sample(&surface, wi, lobe, Vec2::new(x, y), Query::default()) else { return Rgb::ZERO };
+        let Some(sample) = bsdf.sample(&surface, wi, lobe, Vec2::new(x, y), Query::default()) else { return sum };
         throughput *= sample.weight;
         let ray = surface.spawn(surface.frame.to_world(sample.wo));
         if sample.wo.z * wi.z > 0.0 {
             let from = Receiver { p: surface.p, n: Vec3::ZERO };
             let start = Start { ray, from, pdf: sample.pdf, delta: true, eta: sample.eta, depth: depth + 1 };
-            return keep_finite(throughput * incident(world, start, None, params, sampler));
+            return keep_finite(sum + throughput * incident(world, start, None, params, sampler));
         }
-        let Some(next) = world.seen(&ray) else { return Rgb::ZERO };
+        let Some(next) = world.intersect(&ray) else { return sum };
         (surface, wo) = (next, -ray.d);
+        sum += throughput * world.lights.emitted(&world.scene, &surface, wo);
     }
-    Rgb::ZERO
+    sum
 }
 
 /// Samples that were not finite and counted as zero, since the program started (debug builds only).

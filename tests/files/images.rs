@@ -104,7 +104,7 @@ fn infinite_texels_are_clamped_with_a_warning() {
     ExrImage::new(3, 1).with_rgb("", &pixels).write(&folder.path("sky.exr")).unwrap();
     let (image, odd) = read(&folder.path("sky.exr"), ReadOptions::default()).unwrap();
     assert_eq!(image.pixel(0, 0), Vec3::new(70_000.0, 70_000.0, 1.0));
-    assert_eq!(image.pixel(1, 0), Vec3::new(0.0, 2.0, -70_000.0));
+    assert_eq!(image.pixel(1, 0), Vec3::new(0.0, 2.0, 0.0));
     assert_eq!(image.pixel(2, 0), Vec3::ONE);
     assert!(odd.len() == 1 && odd[0].contains("2 pixels are infinite") && odd[0].contains("1 pixels are no number"), "{odd:?}");
     let scene = folder.load("<shape type='cube'/><emitter type='envmap'><string name='filename' value='sky.exr'/></emitter>");

@@ -40,7 +40,7 @@ pub fn read(path: &Path, options: ReadOptions) -> Result<(Image, Vec<String>)> {
     Ok((image, odd))
 }
 
-/// Infinities, such as a sun that half floats cannot hold, become the largest half float, or the image's largest number if that is more;
+/// Infinities (those below 0 become 0), such as a sun that half floats cannot hold, become the largest half float, or the image's largest number if that is more;
 /// what is no number becomes 0. Says what was changed.
 fn make_finite(pixels: &mut [Rgb]) -> Option<String> {
     const LARGEST_HALF: f32 = 65504.0;
@@ -49,7 +49,7 @@ fn make_finite(pixels: &mut [Rgb]) -> Option<String> {
     for p in pixels.iter_mut().filter(|p| !p.is_finite()) {
         infinite += usize::from(p.to_array().iter().any(|x| x.is_infinite()));
         no_number += usize::from(p.is_nan());
-        *p = p.map(|x| if x.is_nan() { 0.0 } else { x.clamp(0.0, largest) });
+        *p = p.map(|x| if x.is_nan() || x == f32::NEG_INFINITY { 0.0 } else { x.min(largest) });
     }
     let told = [(infinite, format!("infinite, taken for {largest}")), (no_number, "no number, taken for 0".into())];
     let told: Vec<_> = told.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} pixels are {what}")).collect();

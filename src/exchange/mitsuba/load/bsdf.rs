@@ -216,13 +216,12 @@ impl<'a> Builder<'a> {
 
     /// A colour, or the mean of a texture.
     fn mean_color(&mut self, p: &mut Params<'a>, name: &str, default: Rgb) -> Result<Rgb> {
-        match p.get(name) {
-            Some(param) if p.color_of(param)?.is_none() => {
-                p.warn(param.at.warning(format!("{name}: of a texture the mean is taken")));
-                Ok(self.textured(p, name, 0.0)?.mean())
-            }
-            _ => p.color(name, default),
+        let Some(param) = p.get(name) else { return Ok(default) };
+        if let Some(color) = p.color_of(param)? {
+            return Ok(color);
         }
+        p.warn(param.at.warning(format!("{name}: of a texture the mean is taken")));
+        Ok(self.textured(p, name, 0.0)?.mean())
     }
 
     fn alphas(&mut self, p: &mut Params<'a>) -> Result<(Texture, Texture)> {
