@@ -282,7 +282,7 @@ fn unit_scale_keeps_the_picture_and_scales_all_lengths() {
     assert!((hundred.geometry.bounds().1 - one.geometry.bounds().1 * 100.0).length() < 1e-3);
     let [near, far] = [&one, &hundred].map(|s| s.sensor.clone().unwrap());
     assert_eq!(far.position(), near.position() * 100.0);
-    assert!((far.aperture_radius - 10.0).abs() < 1e-5 && far.focus_distance == 100.0 && far.fov_x == near.fov_x);
+    assert!((far.aperture_radius - 10.0).abs() < 1e-5 && far.focus_distance == 1e6 && far.fov_x == near.fov_x);
     let Emitter::Point { position, intensity } = hundred.emitters[0] else { panic!() };
     assert_eq!((position.y, intensity.x), (300.0, 1e4), "the irradiance stays");
     assert_ne!(one.hash, hundred.hash);
@@ -358,7 +358,7 @@ fn bad_xml_is_told_where_and_why() {
     for (body, expected) in [
         ("\n<shape type='teapot'/>".into(), "s.xml:2: unknown shape plugin \"teapot\""),
         (shape("\n<bsdf type='velvet'/>"), "s.xml:3: unknown bsdf plugin \"velvet\""),
-        ("\n<emitter type='sun'/>".into(), "s.xml:2: sun: the sun and sky models are not read"),
+        ("\n<emitter type='timed_sunsky'/>".into(), "s.xml:2: timed_sunsky"),
         ("<texture type='marble'/>".into(), "unknown texture plugin"),
         ("<sensor type='fisheye'/>".into(), "unknown sensor plugin"),
         ("\n<widget type='x'/>".into(), "s.xml:2: unknown element <widget>"),

@@ -80,8 +80,8 @@ impl<'a> Builder<'a> {
         // Axes and clipping planes are about the whole film, also where only a part of it is rendered.
         let fov_x = if parallel { 1.0 } else { fov_x(p, window.film)? };
         // Perspective sensors of Mitsuba 0.6 carry a distance that they do not use.
-        let far = p.f32("far_clip", FAR)?;
-        let focus_distance = p.f32("focus_distance", far)?;
+        let elsewhere = if lens { p.f32("far_clip", FAR)? } else { 1.0 };
+        let focus_distance = p.f32("focus_distance", elsewhere)?;
         if focus_distance <= 0.0 {
             return Err(p.at("focus_distance").error(format!("focus_distance = {focus_distance}: expected more than 0")));
         }
