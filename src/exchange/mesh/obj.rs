@@ -128,8 +128,7 @@ impl Lines {
     }
 
     fn into_file(self) -> MeshFile {
-        // As Mitsuba: texture coordinates that the file has and no face refers to make those of all vertices (0, 0).
-        let (any_uv, any_normal) = (!self.uvs.is_empty(), self.corners.iter().any(|c| c[2] != NONE));
+        let (any_uv, any_normal) = (self.corners.iter().any(|c| c[1] != NONE), self.corners.iter().any(|c| c[2] != NONE));
         let mut mesh = Mesh::default();
         let mut colors = Vec::new();
         let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());
