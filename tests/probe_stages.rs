@@ -5,6 +5,7 @@ use reprobe::exchange::load;
 use reprobe::method::glossy_probes::seen::SeenBuffers;
 use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::probe::placement::{Density, ProbeGrid};
+use reprobe::probe::places::{Placement, Places};
 use reprobe::probe::reach::{ReachParams, blocked, reach};
 use reprobe::transport::World;
 use std::path::Path;
@@ -143,6 +144,69 @@ fn stages_follow_each_other_and_one_thread_equals_many() {
     let (map, provenance) = ParameterMap::load(&one.path().join("qhmap"), 3).unwrap();
     assert_eq!((map.size, map.mesh), ([128, 64], [64, 32]));
     assert_eq!(provenance.inputs.keys().collect::<Vec<_>>(), ["probes", "resmap"]);
+}
+
+#[test]
+fn probes_off_the_grid_are_in_the_room_the_same_for_any_threads_and_no_grid_to_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("scene.xml"), scene("")).unwrap();
+    let place = |method: &str, threads: &str, output: &str, more: &[&str]| {
+        let args = ["place-probes", "scene.xml", "--method", method, "--threads", threads, "--json", "-o", output];
+        succeeds(folder, &[&args[..], more].concat())
+    };
+    for method in ["sdf", "medial-axis"] {
+        let more = ["--count", "5", "--refine", "1", "--picture", "plan.png"];
+        let figures = place(method, "1", "a.json", &more);
+        let read = |name: &str| std::fs::read(folder.join(name)).unwrap();
+        if method == "sdf" {
+            place(method, "2", "b.json", &more);
+            assert!(read("a.json") == read("b.json"), "{method}");
+        }
+        let places = Places::read(&folder.join("a.json")).unwrap();
+        assert_eq!((places.method().to_string().as_str(), places.positions().len()), (method, 5));
+        for p in places.positions() {
+            assert!(p.abs().cmplt(Vec3::new(2.0, 1.0, 1.5)).all(), "{p} is outside");
+            assert!((p - Vec3::new(1.0, -0.5, 0.0)).abs().max_element() > 0.5, "{p} is in the box");
+        }
+        let share = |which: &str| figures[which]["coverage"].as_f64().unwrap();
+        assert!(share("before") > 0.9 && share("after") >= share("before") && figures["count"] == 5, "{figures}");
+        assert!(read("plan.png").starts_with(b"\x89PNG"));
+    }
+    let (code, _, err) = reprobe(folder, &["resmap", "scene.xml", "--probes", "a.json", "-o", "r"]);
+    let expected = "a.json: its probes are no grid (place-probes --method medial-axis); this stage needs one: --method grid";
+    assert!(code == Some(2) && err.contains(expected), "{err}");
+    let grid =
+        succeeds(folder, &["place-probes", "scene.xml", "--grid", "3x2x2", "--picture", "plan.png", "-o", "g.json", "--json"]);
+    assert!((0.5..1.0).contains(&grid["coverage"].as_f64().unwrap()), "{grid}");
+    assert!(Places::read(&folder.join("g.json")).unwrap().method() == Placement::Grid);
+}
+
+#[test]
+fn options_of_another_method_of_placement_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("scene.xml"), scene("")).unwrap();
+    std::fs::write(folder.join("photograph.png"), b"\x89PNG").unwrap();
+    for (args, expected) in [
+        (&["--method", "sdf", "--grid", "2x2x2"][..], "--grid: --method sdf has no use for it; grid has"),
+        (&["--method", "medial-axis", "--spacing", "1"], "--spacing: --method medial-axis has no use for it; grid has"),
+        (&["--refine", "3"], "--refine: --method grid has no use for it; sdf, medial-axis have"),
+        (&["--method", "grid", "--coverage", "0.5"], "--coverage: --method grid has no use for it"),
+        (&["--method", "sdf", "--margin", "1"], "--margin: --method sdf has no use for it; grid has"),
+        (&["--method", "sdf", "--count", "0"], "--count 0: expected from 1 to"),
+        (&["--method", "sdf", "--coverage", "0"], "--coverage 0: expected a share above 0"),
+        (&["--method", "sdf", "--coverage", "1.5"], "--coverage 1.5: expected a share above 0, at most 1"),
+        (&["--method", "sdf", "--coverage", "nan"], "--coverage NaN: expected a share"),
+        (&["--method", "sdf", "--refine", "1000000"], "--refine 1000000: expected at most"),
+        (&["--method", "tetrahedra"], "expected grid, sdf, medial-axis"),
+        (&["--picture", "plan.jpg"], "plan.jpg: expected a name that ends in .png"),
+        (&["--picture", "photograph.png"], "photograph.png: was not written by reprobe"),
+    ] {
+        let (code, _, err) = reprobe(folder, &[&["place-probes", "scene.xml", "-o", "p.json"], args].concat());
+        assert!(code == Some(2) && err.contains(expected) && !err.contains("panicked"), "{args:?}: {err}");
+        assert!(!folder.join("p.json").exists());
+    }
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub mod parts;
 pub mod seam;
 pub mod solid;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 pub mod texels;
 pub mod visible;
 

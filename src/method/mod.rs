@@ -6,6 +6,7 @@
 mod contract;
 pub mod glossy_probes;
 pub mod image_space_gather;
+pub mod light_field_probes;
 pub mod lightmap_rt;
 pub mod path_trace;
 pub mod ulr;
@@ -27,8 +28,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// All methods, the default first.
-pub const METHODS: &[&Method] =
-    &[&glossy_probes::METHOD, &path_trace::METHOD, &ulr::METHOD, &image_space_gather::METHOD, &lightmap_rt::METHOD];
+pub const METHODS: &[&Method] = &[
+    &glossy_probes::METHOD,
+    &path_trace::METHOD,
+    &ulr::METHOD,
+    &image_space_gather::METHOD,
+    &lightmap_rt::METHOD,
+    &light_field_probes::METHOD,
+];
 
 /// A row of the table.
 pub struct Method {
@@ -159,6 +166,8 @@ pub struct Options {
     pub rfilter: Option<FilterChoice>,
     /// `--denoise`.
     pub denoise: bool,
+    /// `--trace`.
+    pub trace: Option<String>,
     /// `--paper`.
     pub paper: bool,
     /// `--set NAME=VALUE`.

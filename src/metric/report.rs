@@ -2,10 +2,9 @@
 
 use super::without_noise::WithoutNoise;
 use super::{Comparison, Metrics, Raster, flip, view};
+use crate::Result;
 use crate::io::Provenance;
-use crate::{Error, Result};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+pub(super) use crate::io::picture::png;
 use serde::Serialize;
 
 /// `metrics.json`.
@@ -80,15 +79,6 @@ impl Report {
 fn colours() -> Vec<String> {
     let steps: Vec<f32> = (0..=16).map(|i| i as f32 / 16.0).collect();
     flip::magma(&steps).chunks_exact(3).map(|c| format!("rgb({}, {}, {})", c[0], c[1], c[2])).collect()
-}
-
-/// Three bytes a pixel as a PNG file.
-pub(super) fn png(pixels: &[u8], [width, height]: [usize; 2]) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(pixels, width as u32, height as u32, ExtendedColorType::Rgb8)
-        .map_err(|e| Error::Request(format!("PNG of {width} x {height}: {e}")))?;
-    Ok(bytes)
 }
 
 /// The pictures of a frame in the report.

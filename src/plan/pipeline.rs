@@ -1,7 +1,7 @@
 //! From a scene to frames: the stages that lead to a method's frames, each reading what the ones before it write.
 
 use super::settings::Settings;
-use super::stages::{BakeLightmap, BakeProbes, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
+use super::stages::{BakeLightfield, BakeLightmap, BakeProbes, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
 use super::views::FrameList;
 use super::{Context, Outcome, Stage};
 use crate::method::{Method, Need};
@@ -23,6 +23,8 @@ pub struct Bakes {
     pub lightmap: PathBuf,
     /// Baked probes.
     pub probes: PathBuf,
+    /// Light field probes.
+    pub lightfield: PathBuf,
 }
 
 impl Bakes {
@@ -36,6 +38,7 @@ impl Bakes {
             curvature: at("curvature.exr"),
             lightmap: at("lightmap.exr"),
             probes: at("probes"),
+            lightfield: at("lightfield"),
         }
     }
 }
@@ -55,7 +58,7 @@ pub struct Pipeline {
 
 impl Pipeline {
     /// The stages that make `bakes`, in order.
-    pub fn bakes(&self, bakes: &Bakes) -> [Stage; 6] {
+    pub fn bakes(&self, bakes: &Bakes) -> [Stage; 7] {
         let (s, scene) = (&self.settings, || self.scene.clone());
         let for_path = !s.all_texels;
         [
@@ -104,6 +107,15 @@ impl Pipeline {
                 ..Default::default()
             }
             .into(),
+            BakeLightfield {
+                scene: scene(),
+                probes: bakes.grid.clone(),
+                // As many texels as the other probes have, or about.
+                size: Some((s.probe_size.0[0] * s.probe_size.0[1]).isqrt().next_power_of_two()),
+                output: bakes.lightfield.clone(),
+                ..Default::default()
+            }
+            .into(),
         ]
     }
 
@@ -115,7 +127,10 @@ impl Pipeline {
             frames: self.frames.clone(),
             size: self.settings.size,
             method: Some(method.name.into()),
-            probes: method.reads.probes.map(|_| bakes.probes.clone()),
+            probes: method
+                .reads
+                .probes
+                .map(|p| if p.stage == BakeLightfield::COMMAND { &bakes.lightfield } else { &bakes.probes }.clone()),
             lightmap: (method.reads.lightmap != Need::No).then(|| bakes.lightmap.clone()),
             curvature: (method.reads.curvature != Need::No).then(|| bakes.curvature.clone()),
             supersample: method.uses("supersample").then_some(self.settings.supersample),

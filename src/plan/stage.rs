@@ -1,6 +1,6 @@
 //! A stage of a pipeline: one of the subcommands that read files and write files.
 
-use super::stages::{BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
+use super::stages::{BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
 use super::{Context, Outcome, overwrite};
 use crate::Result;
 use crate::io::atomic;
@@ -22,6 +22,8 @@ pub enum Stage {
     BakeLightmap(BakeLightmap),
     /// `bake-probes`
     BakeProbes(BakeProbes),
+    /// `bake-lightfield`
+    BakeLightfield(BakeLightfield),
     /// `render-path`
     RenderPath(RenderPath),
     /// `compare`
@@ -29,8 +31,15 @@ pub enum Stage {
 }
 
 /// The stages that bake, in the order in which they run.
-pub const BAKES: [&str; 6] =
-    [PlaceProbes::COMMAND, Resmap::COMMAND, Qhmap::COMMAND, Curvature::COMMAND, BakeLightmap::COMMAND, BakeProbes::COMMAND];
+pub const BAKES: [&str; 7] = [
+    PlaceProbes::COMMAND,
+    Resmap::COMMAND,
+    Qhmap::COMMAND,
+    Curvature::COMMAND,
+    BakeLightmap::COMMAND,
+    BakeProbes::COMMAND,
+    BakeLightfield::COMMAND,
+];
 
 /// Does the same with whichever stage it is.
 macro_rules! with {
@@ -42,6 +51,7 @@ macro_rules! with {
             Stage::Curvature($s) => $what,
             Stage::BakeLightmap($s) => $what,
             Stage::BakeProbes($s) => $what,
+            Stage::BakeLightfield($s) => $what,
             Stage::RenderPath($s) => $what,
             Stage::Compare($s) => $what,
         }
@@ -55,7 +65,7 @@ macro_rules! from {
         }
     })+ };
 }
-from!(PlaceProbes, Resmap, Qhmap, Curvature, BakeLightmap, BakeProbes, RenderPath, Compare);
+from!(PlaceProbes, Resmap, Qhmap, Curvature, BakeLightmap, BakeProbes, BakeLightfield, RenderPath, Compare);
 
 impl Stage {
     /// The subcommand.
@@ -70,6 +80,7 @@ impl Stage {
             Self::Curvature(s) => of(s, Curvature::COMMAND),
             Self::BakeLightmap(s) => of(s, BakeLightmap::COMMAND),
             Self::BakeProbes(s) => of(s, BakeProbes::COMMAND),
+            Self::BakeLightfield(s) => of(s, BakeLightfield::COMMAND),
             Self::RenderPath(s) => of(s, RenderPath::COMMAND),
             Self::Compare(s) => of(s, Compare::COMMAND),
         }
@@ -95,6 +106,7 @@ impl Stage {
         match self {
             Self::PlaceProbes(_) | Self::Curvature(_) | Self::BakeLightmap(_) => vec![],
             Self::Resmap(s) => vec![&s.probes],
+            Self::BakeLightfield(s) => vec![&s.probes],
             Self::Qhmap(s) => vec![&s.resmap],
             Self::BakeProbes(s) => [&s.probes, &s.qhmap].into_iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::RenderPath(s) => s.probes.iter().chain(&s.lightmap).chain(&s.curvature).collect(),
@@ -109,6 +121,7 @@ impl Stage {
             Self::Resmap(s) => vec![&s.scene],
             Self::Curvature(s) => vec![&s.scene],
             Self::BakeLightmap(s) => vec![&s.scene],
+            Self::BakeLightfield(s) => vec![&s.scene],
             Self::BakeProbes(s) => [&s.scene].into_iter().chain(&s.for_path).collect(),
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::Qhmap(_) => vec![],

@@ -1,10 +1,22 @@
-//! What every kind of probe shares: where probes stand ([`placement`], [`reach`]), how directions and texels belong together
-//! ([`parameter_map`], [`mesh_inverse`]), what a texel holds ([`file`]), and folders of them ([`set`], [`store`]).
+//! What every kind of probe shares: where probes stand ([`places`]: on a grid, [`placement`] and [`reach`]; or on a scene's skeleton,
+//! [`nonuniform`]: [`skeleton`], [`clip`], [`coverage`], [`select`], [`refine`], [`plan_picture`]), how directions and texels belong together
+//! ([`parameter_map`], [`mesh_inverse`]; [`octahedral`]), what a texel holds ([`file`]), and folders of them ([`set`], [`store`]).
 
+pub mod clip;
+pub mod coverage;
 pub mod file;
 pub mod mesh_inverse;
+pub mod nonuniform;
+#[cfg(test)]
+mod nonuniform_tests;
+pub mod octahedral;
 pub mod parameter_map;
 pub mod placement;
+pub mod places;
+pub mod plan_picture;
 pub mod reach;
+pub mod refine;
+pub mod select;
 pub mod set;
+pub mod skeleton;
 pub mod store;

@@ -4,6 +4,7 @@
 //! middle of each, so that none lies in a wall that bounds the box; probes that no line of sight connects with a camera
 //! (those inside objects or behind walls) are marked as blocked, and take no part in the interpolation.
 
+use super::places::Placement;
 use crate::io::{Provenance, json};
 use crate::{Error, Result};
 use glam::{UVec3, Vec3};
@@ -166,9 +167,14 @@ impl ProbeGrid {
         json::write(path, self)
     }
 
-    /// Reads `probes.json`.
+    /// Reads a `probes.json` that holds a grid.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
+        let method = super::places::method(path, &text)?;
+        if method != Placement::Grid {
+            let message = format!("its probes are no grid (place-probes --method {method}); this stage needs one: --method grid");
+            return Err(Error::input(path, message));
+        }
         let grid: Self = json::parse(path, &text)?;
         grid.check().map_err(|message| Error::input(path, message))?;
         Ok(grid)

@@ -33,7 +33,7 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
     /// Opens a folder that was baked from `scene`; keeps at most `capacity` probes (at least 8) in memory.
     pub fn open(folder: &Path, scene: &Scene, capacity: usize) -> Result<Self> {
         let path = folder.join(SET_FILE);
-        let text = read_set(folder)?;
+        let text = read_set(folder, "bake-probes")?;
         let set: BakedSet<Served> = json::parse(&path, &text)?;
         set.provenance.check_scene(&path, &scene.hash)?;
         if set.files.len() != set.grid.len() {
@@ -103,18 +103,18 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
 }
 
 /// The text of a folder's `set.json`.
-fn read_set(folder: &Path) -> Result<String> {
+fn read_set(folder: &Path, stage: &str) -> Result<String> {
     let path = folder.join(SET_FILE);
     std::fs::read_to_string(&path).map_err(|e| {
-        let hint =
-            if e.kind() == std::io::ErrorKind::NotFound { " (the bake is not finished: run bake-probes again)" } else { "" };
+        let is_missing = e.kind() == std::io::ErrorKind::NotFound;
+        let hint = if is_missing { format!(" (the bake is not finished: run {stage} again)") } else { String::new() };
         Error::input(&path, format!("{e}{hint}"))
     })
 }
 
-/// Content hash of a folder's `set.json`.
-pub fn set_hash(folder: &Path) -> Result<String> {
-    Ok(blake3::hash(read_set(folder)?.as_bytes()).to_hex().to_string())
+/// Content hash of a folder's `set.json`, which `stage` should have written.
+pub fn set_hash(folder: &Path, stage: &str) -> Result<String> {
+    Ok(blake3::hash(read_set(folder, stage)?.as_bytes()).to_hex().to_string())
 }
 
 /// Writes `set.json`: the last step of a bake.

@@ -35,12 +35,17 @@ impl<'a> Baseline<'a> {
 
     /// The frame's layers, `glossy` being at the G-buffer's size.
     pub fn layers(&self, view: &GBuffer, glossy: &[Rgb], clock: &mut Clock) -> LayerImages {
-        let small = |fine: &[Rgb]| downsample(fine, view.size(), self.supersample as usize);
         let diffuse = match self.lightmap {
             Some(map) => diffuse_layer(&self.world.scene, view, map),
             None => vec![Rgb::ZERO; glossy.len()],
         };
-        let layers = LayerImages { emission: small(&emission_layer(view)), diffuse: small(&diffuse), glossy: small(glossy) };
+        self.both_layers(view, &diffuse, glossy, clock)
+    }
+
+    /// The frame's layers, the given ones being at the G-buffer's size.
+    pub fn both_layers(&self, view: &GBuffer, diffuse: &[Rgb], glossy: &[Rgb], clock: &mut Clock) -> LayerImages {
+        let small = |fine: &[Rgb]| downsample(fine, view.size(), self.supersample as usize);
+        let layers = LayerImages { emission: small(&emission_layer(view)), diffuse: small(diffuse), glossy: small(glossy) };
         clock.lap("composite");
         layers
     }

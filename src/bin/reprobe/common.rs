@@ -56,8 +56,9 @@ pub struct Common {
 pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
     const SCENE: [&str; 4] = ["unit_scale", "defines", "skip_unsupported", "allow_truncated"];
     for (command, idle) in [
-        ("place-probes", &["device", "seed"][..]),
+        ("place-probes", &["device"][..]),
         ("resmap", &["seed"]),
+        ("bake-lightfield", &["device"]),
         ("qhmap", &[&["device", "seed"][..], &SCENE].concat()),
         ("curvature", &["device", "seed"]),
         ("compare", &[&["device", "seed"][..], &SCENE].concat()),

@@ -1,6 +1,7 @@
 //! The command line: arguments become a stage, which the library runs; its result is reported. Exit codes: 0 done, 1 a check failed, 2 bad
 //! usage or input.
 
+mod bake_lightfield;
 mod bake_lightmap;
 mod bake_probes;
 mod common;
@@ -53,6 +54,7 @@ enum Command {
     Curvature(curvature::Args),
     BakeProbes(bake_probes::Args),
     BakeLightmap(bake_lightmap::Args),
+    BakeLightfield(bake_lightfield::Args),
     RenderPath(render_path::Args),
     Compare(compare::Args),
     Devices(devices::Args),
@@ -109,6 +111,7 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::Curvature(args) => args.stage().into(),
         Command::BakeProbes(args) => args.stage().into(),
         Command::BakeLightmap(args) => args.stage().into(),
+        Command::BakeLightfield(args) => args.stage().into(),
         Command::RenderPath(args) => args.stage().into(),
         Command::Compare(args) => args.stage().into(),
         Command::Devices(args) => return devices::run(&args),
@@ -128,7 +131,9 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use reprobe::plan::stages::{BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
+    use reprobe::plan::stages::{
+        BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap,
+    };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
     #[test]
@@ -140,6 +145,7 @@ mod tests {
             (Qhmap::COMMAND, Qhmap::OPTIONS),
             (Curvature::COMMAND, Curvature::OPTIONS),
             (BakeLightmap::COMMAND, BakeLightmap::OPTIONS),
+            (BakeLightfield::COMMAND, BakeLightfield::OPTIONS),
             (BakeProbes::COMMAND, BakeProbes::OPTIONS),
             (RenderPath::COMMAND, RenderPath::OPTIONS),
             (Compare::COMMAND, Compare::OPTIONS),

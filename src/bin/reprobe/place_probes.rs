@@ -2,19 +2,26 @@
 
 use reprobe::plan::option::List;
 use reprobe::plan::stages::PlaceProbes;
-use reprobe::probe::reach::ReachParams;
+use reprobe::probe::places::Placement;
 use std::path::PathBuf;
 
-/// Place probes on a regular grid
+/// Place probes on a regular grid, or where a scene's shape asks for them
 ///
-/// The grid fills a box: the one given by --bounds; or that of the camera path's positions, widened by --margin; or, without
+/// A grid (--method grid) fills a box: the one given by --bounds; or that of the camera path's positions, widened by --margin; or, without
 /// either, the free space that the scene's own sensor sees in all directions. Probes inside objects or behind walls are listed
 /// as blocked, and are not used.
+///
+/// The other methods look for places in the free space of all that cameras see, or of --bounds: what can be walked to from there. sdf takes those that are
+/// equally far from several surfaces, by a distance field; medial-axis the middles of balls that touch several surfaces. Of these,
+/// probes are chosen until they see enough, those first that see most of what no other sees; --refine moves them to where they see
+/// more, less at a slant and from farther away. A set without a grid serves the methods of frames that say so.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe place-probes room/scene.xml -o probes.json
   reprobe place-probes room/scene.xml -o probes.json --grid 4x3x4 --path room/path.json
-  reprobe place-probes room/scene.xml -o probes.json --spacing 0.5 --bounds=-2,0.2,-2,2,2.2,2")]
+  reprobe place-probes room/scene.xml -o probes.json --spacing 0.5 --bounds=-2,0.2,-2,2,2.2,2
+  reprobe place-probes room/scene.xml -o probes.json --method sdf --coverage 0.999 --picture plan.png
+  reprobe place-probes room/scene.xml -o probes.json --method medial-axis --count 24 --refine 20")]
 pub struct Args {
     /// Mitsuba scene, XML or JSON
     #[arg(value_name = "SCENE")]
@@ -22,30 +29,42 @@ pub struct Args {
     /// The file to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// How to place them: grid, sdf or medial-axis [default: grid]
+    #[arg(long, value_name = "METHOD")]
+    method: Option<Placement>,
     /// Probes along x, y and z [default: 7x6x6]
     #[arg(long, value_name = "XxYxZ", conflicts_with_all = ["spacing", "count"])]
     grid: Option<List<u32, 3, 'x'>>,
-    /// About so many probes, evenly spaced
+    /// About so many probes, evenly spaced; of sdf and medial-axis, so many
     #[arg(long, value_name = "N", conflicts_with = "spacing")]
     count: Option<u32>,
     /// Distance of neighbours, metres
     #[arg(long, value_name = "M")]
     spacing: Option<f32>,
+    /// sdf, medial-axis: share of the reachable surfaces that probes are to see [default: 0.999, or what --count sees]
+    #[arg(long, value_name = "SHARE")]
+    coverage: Option<f64>,
+    /// sdf, medial-axis: passes over all probes that move them to where they see more
+    #[arg(long, value_name = "N")]
+    refine: Option<u32>,
     /// The box to fill, metres
     #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", conflicts_with = "path", allow_hyphen_values = true)]
     bounds: Option<List<f32, 6, ','>>,
-    /// Fill the space that this camera path moves in
+    /// Fill the space that this camera path moves in; of sdf and medial-axis, that its cameras see
     #[arg(long, value_name = "PATH.json")]
     path: Option<PathBuf>,
-    /// Widens the box of the camera path, metres
-    #[arg(long, value_name = "M", default_value_t = ReachParams::default().margin)]
-    margin: f32,
+    /// grid: widens the box of the camera path, metres [default: 0.5]
+    #[arg(long, value_name = "M")]
+    margin: Option<f32>,
+    /// Draw the probes in the scene from above and from the side; magenta is what none of them sees
+    #[arg(long, value_name = "FILE.png")]
+    picture: Option<PathBuf>,
 }
 
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> PlaceProbes {
-        let Self { scene, output, grid, count, spacing, bounds, path, margin } = self;
-        PlaceProbes { scene, output, grid, count, spacing, bounds, path, margin: Some(margin) }
+        let Self { scene, output, method, grid, count, spacing, coverage, refine, bounds, path, margin, picture } = self;
+        PlaceProbes { scene, method, grid, count, spacing, coverage, refine, bounds, path, margin, picture, output }
     }
 }

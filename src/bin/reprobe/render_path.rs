@@ -50,6 +50,8 @@ pub struct Args {
     spp: Option<u32>,
     #[arg(long, value_name = "N", help = used_by("samples", "taps a pixel, or glossy rays at the first vertex [default: 64, 4]"))]
     samples: Option<u32>,
+    #[arg(long, value_name = "WAY", help = used_by("trace", "how maps are searched: two-scale or hi-z [default: hi-z]"))]
+    trace: Option<String>,
     #[arg(long, value_name = "N", help = used_by("max-depth", "most scattering vertices of a path [default: the scene's max_depth less one; lightmap-rt: 3]"))]
     max_depth: Option<u32>,
     #[arg(long, value_name = "LAYERS", help = used_by("layers", "all: the image and its layers; full: the image alone, one path a sample [default: all]"))]
@@ -101,6 +103,7 @@ impl Args {
             supersample: self.supersample,
             spp: self.spp,
             samples: self.samples,
+            trace: self.trace,
             max_depth: self.max_depth,
             layers: self.layers,
             rfilter: self.rfilter,

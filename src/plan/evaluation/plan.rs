@@ -161,14 +161,15 @@ fn folders(of: &Evaluate, variant: &Variant) -> Bakes {
     let common = Bakes::within(&root);
     let within = |stages: &[&str]| own(variant, stages).map(|name| Bakes::within(&root.join(name)));
     let given = |own: Option<PathBuf>, given: &Option<PathBuf>, common: PathBuf| own.or(given.clone()).unwrap_or(common);
-    let [place, resmap, qhmap, curvature, lightmap, _] = BAKES;
+    let [place, resmap, qhmap, curvature, lightmap, probes, lightfield] = BAKES;
     Bakes {
         grid: within(&[place]).map_or(common.grid, |b| b.grid),
         resmap: within(&[place, resmap]).map_or(common.resmap, |b| b.resmap),
         qhmap: within(&[place, resmap, qhmap]).map_or(common.qhmap, |b| b.qhmap),
         curvature: given(within(&[curvature]).map(|b| b.curvature), &of.curvature, common.curvature),
         lightmap: given(within(&[lightmap]).map(|b| b.lightmap), &of.lightmap, common.lightmap),
-        probes: given(within(&BAKES).map(|b| b.probes), &of.probes, common.probes),
+        probes: given(within(&[place, resmap, qhmap, curvature, lightmap, probes]).map(|b| b.probes), &of.probes, common.probes),
+        lightfield: within(&[place, lightfield]).map_or(common.lightfield, |b| b.lightfield),
     }
 }
 
@@ -274,7 +275,7 @@ mod tests {
         for (variant, expected) in [
             (
                 "x=path-trace,--samples=4",
-                "x: --samples: --method path-trace has no use for it; image-space-gather, lightmap-rt has",
+                "x: --samples: --method path-trace has no use for it; image-space-gather, lightmap-rt, light-field-probes has",
             ),
             ("x=glossy-probes,gather.foo=3", "x: --set gather.foo=3: no such parameter"),
             ("x=ulr,blend=0", "x: blend=0: expected 1 to 64"),

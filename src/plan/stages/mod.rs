@@ -1,5 +1,6 @@
 //! The stages, a file each: options, checks, reading, the call, writing, and what is told of it.
 
+mod bake_lightfield;
 mod bake_lightmap;
 mod bake_probes;
 mod compare;
@@ -10,6 +11,7 @@ mod render_path;
 mod resmap;
 mod set;
 
+pub use bake_lightfield::BakeLightfield;
 pub use bake_lightmap::BakeLightmap;
 pub use bake_probes::BakeProbes;
 pub use compare::{Compare, frame_names, read_pair};

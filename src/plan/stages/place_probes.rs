@@ -1,39 +1,64 @@
 //! `place-probes`.
 
-use crate::io::Provenance;
-use crate::plan::option::{List, stage};
+use crate::base::clock::seconds;
+use crate::io::{Provenance, picture};
+use crate::plan::option::{List, stage, text};
 use crate::plan::{Context, Outcome};
-use crate::probe::placement::{Density, ProbeGrid};
+use crate::probe::nonuniform::{Bounds, COVERAGE, NonuniformParams, Reachable, place};
+use crate::probe::placement::{Density, PROBES_MAX, ProbeGrid};
+use crate::probe::places::{Placement, Places, ProbeList};
+use crate::probe::plan_picture::draw;
 use crate::probe::reach::{ReachParams, blocked, reach};
+use crate::probe::refine::RefineParams;
 use crate::scene::{Scene, camera_path};
+use crate::transport::World;
 use crate::{Error, Result};
 use glam::Vec3;
 use serde_json::json;
 use std::path::PathBuf;
 
+text!(Placement);
+
+/// Most passes of a refinement.
+const PASSES_MAX: u32 = 10_000;
+
 stage! {
-    /// Places probes on a regular grid.
+    /// Places probes: on a regular grid, or where a scene's shape asks for them.
     PlaceProbes "place-probes"
     {
         /// The scene.
         scene,
     }
     {
+        /// How to place them.
+        "--method" method: Option<Placement>,
         /// Probes along x, y and z.
         "--grid" grid: Option<List<u32, 3, 'x'>>,
-        /// About so many probes, evenly spaced.
+        /// About so many probes, evenly spaced; of the other methods, so many.
         "--count" count: Option<u32>,
         /// Distance of neighbours, metres.
         "--spacing" spacing: Option<f32>,
+        /// Share of the reachable surfaces that probes are to see.
+        "--coverage" coverage: Option<f64>,
+        /// Passes that move probes to where they see more.
+        "--refine" refine: Option<u32>,
         /// The box to fill, metres: its lower corner, then its upper one.
         "--bounds" bounds: Option<List<f32, 6, ','>>,
         /// Camera path whose space is filled.
         "--path" path: Option<PathBuf>,
         /// Widens the box of the camera path, metres.
         "--margin" margin: Option<f32>,
+        /// A drawing of the probes in the scene, PNG.
+        "--picture" picture: Option<PathBuf>,
         /// The file to write.
         "--output" output: PathBuf,
     }
+}
+
+/// What every method starts from.
+struct Ground {
+    cameras: Vec<Vec3>,
+    bounds: Bounds,
 }
 
 impl PlaceProbes {
@@ -44,6 +69,7 @@ impl PlaceProbes {
 
     /// Refuses what does not go together.
     pub fn check(&self) -> Result<()> {
+        self.check_method()?;
         if let Some(margin) = self.margin.filter(|m| !(m.is_finite() && *m >= 0.0)) {
             return Err(Error::Request(format!("--margin {margin}: expected metres, not negative")));
         }
@@ -61,6 +87,40 @@ impl PlaceProbes {
         if self.bounds.is_some() && self.path.is_some() {
             return Err(Error::Request("--bounds, --path: expected one of them".into()));
         }
+        if let Some(path) = &self.picture {
+            picture::check_png(path)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses options that the method has no use for, and values out of their range.
+    fn check_method(&self) -> Result<()> {
+        let method = self.method.unwrap_or_default();
+        let is_grid = method == Placement::Grid;
+        for (option, is_given, of_grid) in [
+            ("grid", self.grid.is_some(), true),
+            ("spacing", self.spacing.is_some(), true),
+            ("margin", self.margin.is_some(), true),
+            ("coverage", self.coverage.is_some(), false),
+            ("refine", self.refine.is_some(), false),
+        ] {
+            if is_given && of_grid != is_grid {
+                let others = if of_grid { "grid has" } else { "sdf, medial-axis have" };
+                return Err(Error::Request(format!("--{option}: --method {method} has no use for it; {others}")));
+            }
+        }
+        if is_grid {
+            return Ok(());
+        }
+        if let Some(count) = self.count.filter(|n| !(1..=PROBES_MAX as u32).contains(n)) {
+            return Err(Error::Request(format!("--count {count}: expected from 1 to {PROBES_MAX} probes")));
+        }
+        if let Some(coverage) = self.coverage.filter(|c| !(*c > 0.0 && *c <= 1.0)) {
+            return Err(Error::Request(format!("--coverage {coverage}: expected a share above 0, at most 1, like {COVERAGE}")));
+        }
+        if let Some(passes) = self.refine.filter(|n| *n > PASSES_MAX) {
+            return Err(Error::Request(format!("--refine {passes}: expected at most {PASSES_MAX} passes")));
+        }
         Ok(())
     }
 
@@ -77,37 +137,132 @@ impl PlaceProbes {
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
         let world = cx.opaque_world(&self.scene)?;
-        let cameras = self.cameras(&world.scene)?;
-        let (params, density) = (self.reach(), self.density());
-        let (lower, upper) = match self.bounds {
-            Some(List([x0, y0, z0, x1, y1, z1])) => (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1)),
-            None if cameras.is_empty() => return Err(Error::input(&self.scene, "has no sensor; give --bounds or --path")),
-            None => reach(&world, &cameras, &params)?,
-        };
-        let parameters = json!({
-            "density": density, "bounds": [lower.to_array(), upper.to_array()], "reach": self.bounds.is_none().then_some(params),
-            "cameras": cameras.iter().map(|c| c.to_array()).collect::<Vec<_>>(),
-        });
-        let provenance = Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &parameters);
-        let mut grid = ProbeGrid::in_box(lower, upper, density, provenance)?;
-        if !cameras.is_empty() {
-            grid.blocked = blocked(&world, &grid, &cameras);
+        let ground = self.ground(&world)?;
+        match self.method.unwrap_or_default() {
+            Placement::Grid => self.run_grid(cx, &world, &ground),
+            Placement::Sdf | Placement::MedialAxis => self.run_nonuniform(cx, &world, &ground),
         }
+    }
+
+    fn run_grid(&self, cx: &Context, world: &World, ground: &Ground) -> Result<Outcome> {
+        let (density, (lower, upper)) = (self.density(), ground.bounds.filled);
+        let provenance = self.provenance(cx, world, ground, json!({ "density": density }));
+        let mut grid = ProbeGrid::in_box(lower, upper, density, provenance)?;
+        if !ground.cameras.is_empty() {
+            grid.blocked = blocked(world, &grid, &ground.cameras);
+        }
+        let coverage = self.draw_grid(world, ground, &grid)?;
         grid.write(&self.output)?;
         let ([nx, ny, nz], [sx, sy, sz]) = (grid.counts, grid.spacing);
+        let mut figures = json!({
+            "count": grid.len(), "counts": grid.counts, "spacing": grid.spacing, "blocked": grid.blocked.len(),
+            "bounds": [lower.to_array(), upper.to_array()],
+        });
+        let mut summary = format!(
+            "{}: {} probes ({nx}x{ny}x{nz}), {sx:.2} x {sy:.2} x {sz:.2} m apart, from {lower:.2} to {upper:.2}, {} of them blocked",
+            self.output.display(),
+            grid.len(),
+            grid.blocked.len(),
+        );
+        if let Some(coverage) = coverage {
+            figures["coverage"] = coverage.into();
+            summary += &format!("; the others see {} of the reachable surfaces", percent(coverage));
+        }
+        Ok(Outcome { summary, figures, ..Outcome::default() })
+    }
+
+    /// The picture of a grid, if it is asked for, and what the probes that are not blocked see.
+    fn draw_grid(&self, world: &World, ground: &Ground, grid: &ProbeGrid) -> Result<Option<f64>> {
+        let Some(picture) = &self.picture else { return Ok(None) };
+        // As the other methods would have it, so that shares can be compared.
+        let bounds = Bounds { filled: ground.bounds.seen, ..ground.bounds };
+        let reachable = Reachable::new(world, &bounds, &ground.cameras, &NonuniformParams::default())?;
+        let places = Places::Grid(grid.clone());
+        let used: Vec<Vec3> =
+            places.positions().into_iter().enumerate().filter(|(i, _)| places.is_used(*i)).map(|(_, p)| p).collect();
+        write_picture(picture, world, &reachable, &used)?;
+        let times = reachable.sides.times_seen(&reachable.sides.rows(world, &used));
+        let seen: f64 = reachable.sides.list.iter().zip(times).filter(|(_, n)| *n > 0).map(|(s, _)| f64::from(s.area)).sum();
+        Ok(Some(seen / reachable.sides.area))
+    }
+
+    fn run_nonuniform(&self, cx: &Context, world: &World, ground: &Ground) -> Result<Outcome> {
+        let (clock, method) = (seconds(), self.method.unwrap_or_default());
+        let params = NonuniformParams {
+            method,
+            count: self.count,
+            coverage: self.coverage,
+            refine: RefineParams { passes: self.refine.unwrap_or(0), ..RefineParams::default() },
+            ..NonuniformParams::default()
+        };
+        let reachable = Reachable::new(world, &ground.bounds, &ground.cameras, &params)?;
+        let sides = reachable.sides.list.len();
+        cx.listener.detail(&format!("free space and {sides} reachable sides of texels in {:.2} s", clock()));
+        let placed = place(world, &reachable, &params, (cx.seed, cx.progress()))?;
+        let (count, candidates) = (placed.positions.len(), placed.candidates);
+        if let Some(wanted) = self.count.filter(|&n| self.coverage.is_none() && n as usize > count) {
+            cx.listener.warn(&format!("--count {wanted}: the scene has places for {count} probes only"));
+        }
+        if let Some(wanted) = self.coverage.filter(|&c| self.count.is_none() && c > placed.before.coverage) {
+            cx.listener.warn(&format!("--coverage {wanted}: {count} probes see {} at most", percent(placed.before.coverage)));
+        }
+        let list = ProbeList {
+            method,
+            positions: placed.positions.iter().map(|p| p.to_array()).collect(),
+            provenance: self.provenance(cx, world, ground, json!({ "nonuniform": params })),
+        };
+        list.write(&self.output)?;
+        let seconds = clock();
+        if let Some(picture) = &self.picture {
+            write_picture(picture, world, &reachable, &placed.positions)?;
+        }
+        let (lower, upper) = ground.bounds.filled;
+        let refined = match self.refine {
+            Some(n) => format!("; after {n} passes of refinement {}", percent(placed.after.coverage)),
+            None => String::new(),
+        };
         Ok(Outcome {
             summary: format!(
-                "{}: {} probes ({nx}x{ny}x{nz}), {sx:.2} x {sy:.2} x {sz:.2} m apart, from {lower:.2} to {upper:.2}, {} of them blocked",
+                "{}: {count} probes of {candidates} candidates ({method}) see {} of the reachable surfaces{refined}; {seconds:.1} s",
                 self.output.display(),
-                grid.len(),
-                grid.blocked.len(),
+                percent(placed.before.coverage),
             ),
             figures: json!({
-                "count": grid.len(), "counts": grid.counts, "spacing": grid.spacing, "blocked": grid.blocked.len(),
+                "method": method, "count": count, "candidates": candidates, "sides": sides, "coverage": placed.after.coverage,
+                "before": placed.before, "after": placed.after, "seconds": seconds,
                 "bounds": [lower.to_array(), upper.to_array()],
             }),
             ..Outcome::default()
         })
+    }
+
+    /// Where an output comes from: a method's parameters, and what all methods have.
+    fn provenance(&self, cx: &Context, world: &World, ground: &Ground, method: serde_json::Value) -> Provenance {
+        let (lower, upper) = ground.bounds.filled;
+        let mut parameters = method;
+        parameters["bounds"] = json!([lower.to_array(), upper.to_array()]);
+        parameters["reach"] = json!(self.bounds.is_none().then_some(self.reach()));
+        parameters["cameras"] = json!(ground.cameras.iter().map(|c| c.to_array()).collect::<Vec<_>>());
+        Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &parameters)
+    }
+
+    /// Where cameras stand, and the boxes. A grid fills the space that a path moves in; the other methods fill all that its cameras see:
+    /// from there they have something to choose.
+    fn ground(&self, world: &World) -> Result<Ground> {
+        let cameras = self.cameras(&world.scene)?;
+        let seen = |margin: f32| reach(world, &cameras, &ReachParams { margin, ..self.reach() });
+        let is_grid = self.method.unwrap_or_default() == Placement::Grid;
+        if cameras.is_empty() && (!is_grid || self.picture.is_some()) {
+            return Err(Error::input(&self.scene, "has no sensor: a camera says which space is free; give --path"));
+        }
+        let filled = match self.bounds {
+            Some(List([x0, y0, z0, x1, y1, z1])) => (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1)),
+            None if cameras.is_empty() => return Err(Error::input(&self.scene, "has no sensor; give --bounds or --path")),
+            None => seen(if is_grid { self.reach().margin } else { f32::INFINITY })?,
+        };
+        // A grid with neither picture nor cameras has no use for it.
+        let seen = if is_grid && self.picture.is_none() { filled } else { seen(f32::INFINITY)? };
+        Ok(Ground { cameras, bounds: Bounds { filled, seen } })
     }
 
     /// Where the camera stands: along the path, or the scene's own sensor.
@@ -119,4 +274,14 @@ impl PlaceProbes {
             None => scene.sensor.iter().map(|c| c.position()).collect(),
         })
     }
+}
+
+fn write_picture(path: &std::path::Path, world: &World, reachable: &Reachable, probes: &[Vec3]) -> Result<()> {
+    let drawing = draw(world, &reachable.space, probes);
+    picture::write_png(path, &drawing.rgb, drawing.size)
+}
+
+/// A share as people read it; never 100 % of what is less.
+fn percent(share: f64) -> String {
+    format!("{:.2} %", if share < 1.0 { (share * 100.0).min(99.99) } else { 100.0 })
 }

@@ -57,6 +57,8 @@ stage! {
         "--spp" spp: Option<u32>,
         /// Rays or taps a pixel.
         "--samples" samples: Option<u32>,
+        /// How light field probes' maps are searched.
+        "--trace" trace: Option<String>,
         /// Most scattering vertices of a path.
         "--max-depth" max_depth: Option<u32>,
         /// What to write of a path-traced frame.
@@ -137,7 +139,7 @@ impl RenderPath {
     }
 
     /// Options that not every method uses, and whether they are given.
-    fn given(&self) -> [(&'static str, bool); 15] {
+    fn given(&self) -> [(&'static str, bool); 16] {
         [
             ("probes", self.probes.is_some()),
             ("lightmap", self.lightmap.is_some()),
@@ -145,6 +147,7 @@ impl RenderPath {
             ("supersample", self.supersample.is_some()),
             ("spp", self.spp.is_some()),
             ("samples", self.samples.is_some()),
+            ("trace", self.trace.is_some()),
             ("max-depth", self.max_depth.is_some()),
             ("layers", self.layers.is_some()),
             ("rfilter", self.rfilter.is_some()),
@@ -183,6 +186,7 @@ impl RenderPath {
             supersample: self.supersample,
             spp: self.spp,
             samples: self.samples,
+            trace: self.trace.clone(),
             max_depth: self.max_depth,
             layers: self.layers,
             rfilter: self.rfilter,
@@ -255,7 +259,7 @@ impl RenderPath {
         let scene = &world.scene;
         let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
         if let Some(folder) = &self.probes {
-            provenance = provenance.with_input("probes", set_hash(folder)?);
+            provenance = provenance.with_input("probes", set_hash(folder, method.reads.probes.map_or("", |p| p.stage))?);
             if method.reads.probes.is_some_and(|p| p.any_texel) {
                 warn_of_partial_set(folder, method, cx);
             }
@@ -349,6 +353,7 @@ mod tests {
                 ("supersample", Some("2")),
                 ("spp", Some("4")),
                 ("samples", Some("4")),
+                ("trace", Some("hi-z")),
                 ("max-depth", Some("4")),
                 ("layers", Some("all")),
                 ("rfilter", Some("scene")),
@@ -401,6 +406,7 @@ mod tests {
             ("ulr", &["supersample=0", "blend=0", "blend=100000", "probes=0", "angle=-1"]),
             ("image-space-gather", &["supersample=0", "samples=0", "search_samples=0", "plane_sigma=0", "max_radius=1e9"]),
             ("lightmap-rt", &["supersample=0", "samples=0", "bounces=0"]),
+            ("light-field-probes", &["supersample=0", "samples=0", "direct_samples=0", "thickness=-1", "search=all"]),
             ("path-trace", &["levels=100", "despeckle=25", "normal_power=-1"]),
         ] {
             for set in sets {

@@ -1,0 +1,112 @@
+//! What light field probes store, by rays from where they stand.
+//!
+//! Radiance holds light that surfaces scatter towards the probe, and not what they emit: frames sample emitters themselves. The first bounce
+//! is sampled at every texel; each further one takes the irradiance of the bounce before from the probes (Wang 2019, §5: "iteratively
+//! re-injecting").
+
+use super::ambient::irradiance;
+use super::probe::{Ambient, Surfels};
+use crate::base::math::{Rgb, hash_words};
+use crate::base::named::{Parameters, within};
+use crate::base::ray::Ray;
+use crate::material::bsdf::Query;
+use crate::probe::octahedral::{decode, pack};
+use crate::probe::placement::ProbeGrid;
+use crate::transport::path::{PathParams, scattered};
+use crate::transport::{Sampler, World};
+use crate::{Error, Result};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::f32::consts::FRAC_1_PI;
+
+/// What is baked.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightFieldBakeParams {
+    /// Texels along an edge of the maps: a power of two. *Paper*: 512.
+    pub size: u32,
+    /// Texels along an edge of the maps of irradiance and of moments.
+    pub ambient_size: u32,
+    /// Samples of direct light a texel.
+    pub spp: u32,
+    /// Bounces of light that radiance holds; 1 is direct light alone.
+    pub bounces: u32,
+}
+
+impl Default for LightFieldBakeParams {
+    fn default() -> Self {
+        Self { size: 512, ambient_size: 32, spp: 8, bounces: 3 }
+    }
+}
+
+impl Parameters for LightFieldBakeParams {
+    fn validate(&self) -> Result<()> {
+        if !self.size.is_power_of_two() {
+            return Err(Error::Request(format!("--size {}: expected a power of two, like 512", self.size)));
+        }
+        within("--size", self.size, 16..=4096)?;
+        within("ambient_size", self.ambient_size, 4..=256)?;
+        within("--spp", self.spp, 1..=1 << 16)?;
+        within("--bounces", self.bounces, 1..=64)
+    }
+}
+
+/// What a probe sees before light has bounced more than once.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// The surfaces.
+    pub surfels: Surfels,
+    /// Direct light that they scatter towards the probe.
+    pub direct: Vec<Rgb>,
+    /// Directional albedo of their diffuse lobes, towards the probe.
+    pub albedo: Vec<Rgb>,
+    /// Where they face for diffuse light: the shading normal on the probe's side.
+    pub facing: Vec<Vec3>,
+}
+
+/// Casts a ray through the middle of every texel. The random stream of a texel is a hash of (seed, probe, texel).
+pub fn look(world: &World, position: Vec3, index: u32, params: &LightFieldBakeParams, seed: u32) -> Seen {
+    let n = params.size as usize;
+    let path = PathParams { max_depth: 1, ..PathParams::default() };
+    let texel = |i: usize| {
+        let d = decode((Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32);
+        let Some(surface) = world.intersect(&Ray::new(position, d)) else {
+            return (f32::INFINITY, -d, Rgb::ZERO, Rgb::ZERO, -d);
+        };
+        let stream = hash_words(&[seed, index, i as u32]);
+        let light = |s| scattered(world, &surface, -d, Query::default(), None, &path, &mut Sampler::new(stream, s));
+        let direct = (0..params.spp).map(light).sum::<Rgb>() / params.spp as f32;
+        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let albedo = bsdf.diffuse_albedo(&surface, surface.frame.to_local(-d));
+        let towards = |n: Vec3| if n.dot(d) > 0.0 { -n } else { n };
+        (surface.t, towards(surface.ng), direct, albedo, towards(surface.frame.n))
+    };
+    let all: Vec<_> = (0..n * n).into_par_iter().map(texel).collect();
+    let mut seen = Seen {
+        surfels: Surfels { size: n, distance: Vec::new(), normal: Vec::new() },
+        direct: Vec::new(),
+        albedo: Vec::new(),
+        facing: Vec::new(),
+    };
+    for (distance, normal, direct, albedo, facing) in all {
+        seen.surfels.distance.push(distance);
+        seen.surfels.normal.push(pack(normal));
+        seen.direct.push(direct);
+        seen.albedo.push(albedo);
+        seen.facing.push(facing);
+    }
+    seen
+}
+
+/// Radiance with one bounce more than the irradiance of `before` holds.
+pub fn reinjected(seen: &Seen, position: Vec3, grid: &ProbeGrid, before: &[Ambient]) -> Vec<Rgb> {
+    let texel = |i: usize| {
+        if seen.albedo[i] == Rgb::ZERO {
+            return seen.direct[i];
+        }
+        let p = position + seen.surfels.middle(i) * seen.surfels.distance[i];
+        seen.direct[i] + seen.albedo[i] * irradiance(grid, before, p, seen.facing[i]) * FRAC_1_PI
+    };
+    (0..seen.direct.len()).into_par_iter().map(texel).collect()
+}

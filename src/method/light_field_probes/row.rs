@@ -1,0 +1,87 @@
+//! Light field probes in the table of methods.
+
+use super::shade::Shading;
+use super::store::LightField;
+use super::{LightFieldParams, march::Search};
+use crate::base::clock::Clock;
+use crate::base::named::{apply, tree};
+use crate::base::progress::Progress;
+use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Samples, Setup, as_given};
+use crate::transport::World;
+use crate::view::View;
+use crate::view::baseline::Baseline;
+use crate::{Error, Result};
+use serde_json::Value;
+
+/// The row.
+pub const METHOD: Method = Method {
+    name: "light-field-probes",
+    about: "Light field probes: rays followed through octahedral maps of distance and radiance",
+    reads: Reads { probes: Some(Probes { stage: "bake-lightfield", any_texel: false }), lightmap: Need::No, curvature: Need::No },
+    layers: &["diffuse", "glossy"],
+    options: &["probes", "supersample", "samples", "trace", "budget-ms", "match-time", "set"],
+    samples: Some(Samples { option: "samples", pointer: "/samples" }),
+    transmissive: false,
+    orthographic: false,
+    sequential: false,
+    parameters,
+    for_scene: as_given,
+    cpu,
+    gpu: None,
+};
+
+fn parameters(options: &Options) -> Result<Value> {
+    let base = LightFieldParams::default();
+    let search = match options.trace.as_deref() {
+        None => base.search,
+        Some("two-scale") => Search::TwoScale,
+        Some("hi-z") => Search::HiZ,
+        Some(other) => return Err(Error::Request(format!("--trace {other}: expected two-scale or hi-z"))),
+    };
+    let base = LightFieldParams {
+        supersample: options.supersample.unwrap_or(base.supersample),
+        samples: options.samples.unwrap_or(base.samples),
+        search,
+        ..base
+    };
+    tree(&apply(&base, &options.set)?)
+}
+
+struct OnCpu<'a> {
+    world: &'a World,
+    baseline: Baseline<'a>,
+    field: LightField,
+    params: LightFieldParams,
+    seed: u32,
+    far: f32,
+}
+
+fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let params: LightFieldParams = setup.parameters()?;
+    let field = LightField::load(&setup.required_probes()?, &setup.world.scene)?;
+    let baseline = Baseline::new(setup.world, None, params.supersample);
+    let (low, high) = setup.world.scene.geometry.bounds();
+    let far = 2.0 * low.distance(high).max(f32::MIN_POSITIVE);
+    Ok(Box::new(OnCpu { world: setup.world, baseline, field, params, seed: setup.seed, far }))
+}
+
+impl Renderer for OnCpu<'_> {
+    fn frame(&mut self, view: &View, _: Option<&View>, samples: u32, progress: &dyn Progress) -> Result<Frame> {
+        let params = LightFieldParams { samples, ..self.params };
+        let mut clock = Clock::start();
+        let g = self.baseline.gbuffer(&view.camera, &mut clock);
+        let shading =
+            Shading { world: self.world, field: &self.field, params, seed: self.seed, frame: view.frame, far: self.far };
+        let glossy = shading.glossy(&g);
+        clock.lap("rays");
+        let diffuse = shading.diffuse(&g);
+        clock.lap("diffuse");
+        let layers = self.baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
+        progress.advance(view.camera.size[1].into());
+        Ok(Frame::of(layers, clock.laps))
+    }
+
+    fn probe_bytes(&self) -> [u64; 2] {
+        [self.field.bytes() as u64, 0]
+    }
+}

@@ -1,0 +1,200 @@
+//! Folders of light field probes. Each probe has `NNNN.exr`, what it sees (`distance`, `normal`, `direct`, `albedo`, `facing`),
+//! `NNNN_light.exr`, the radiance of all bounces, and `NNNN_ambient.exr`, irradiance and the moments of distance. `set.json` comes last.
+
+use super::bake::{LightFieldBakeParams, Seen};
+use super::march::Map;
+use super::probe::{Ambient, Light, Surfels};
+use crate::base::math::Rgb;
+use crate::io::{ExrImage, Provenance, json};
+use crate::probe::octahedral::pack;
+use crate::probe::placement::ProbeGrid;
+use crate::scene::Scene;
+use crate::{Error, Result};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// `set.json` of such a folder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LightFieldSet {
+    /// What was baked.
+    pub bake: LightFieldBakeParams,
+    /// Where the probes stand. Blocked ones have no files.
+    pub grid: ProbeGrid,
+    /// Content hashes of each probe's files, in the order of [`files`].
+    pub files: Vec<[String; 3]>,
+    /// Where it came from: the same in every file.
+    pub provenance: Provenance,
+}
+
+/// The files of probe `index`: what it sees, radiance, ambient light.
+pub fn files(folder: &Path, index: usize) -> [PathBuf; 3] {
+    ["", "_light", "_ambient"].map(|ending| folder.join(format!("{index:04}{ending}.exr")))
+}
+
+/// The set's file.
+pub fn set_file(folder: &Path) -> PathBuf {
+    folder.join("set.json")
+}
+
+impl LightFieldSet {
+    /// Reads `set.json`.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = set_file(folder);
+        let text = std::fs::read_to_string(&path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => Error::input(folder, "has no set.json: run bake-lightfield (again)"),
+            _ => Error::io(&path, e),
+        })?;
+        let set: Self = json::parse(&path, &text)?;
+        if set.provenance.stage != "bake-lightfield" || set.files.len() != set.grid.len() {
+            return Err(Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"));
+        }
+        Ok(set)
+    }
+
+    /// Indices of the probes that have files.
+    pub fn baked(&self) -> Vec<usize> {
+        baked(&self.grid)
+    }
+}
+
+/// Indices of the probes of a grid that are worth a bake.
+pub fn baked(grid: &ProbeGrid) -> Vec<usize> {
+    (0..grid.len()).filter(|&i| !grid.is_blocked(i)).collect()
+}
+
+/// Light field probes in memory, by their index; blocked ones hold nothing.
+#[derive(Debug, Clone)]
+pub struct LightField {
+    /// Where they stand.
+    pub grid: ProbeGrid,
+    /// Surfaces.
+    pub maps: Vec<Map>,
+    /// Radiance.
+    pub light: Vec<Light>,
+    /// Irradiance and moments.
+    pub ambient: Vec<Ambient>,
+}
+
+impl LightField {
+    /// Reads a folder that was baked from `scene`.
+    pub fn load(folder: &Path, scene: &Scene) -> Result<Self> {
+        let set = LightFieldSet::read(folder)?;
+        set.provenance.check_scene(&set_file(folder), &scene.hash)?;
+        let (size, ambient_size) = (set.bake.size as usize, set.bake.ambient_size as usize);
+        let read = |i: usize| {
+            if set.grid.is_blocked(i) {
+                return Ok(nothing());
+            }
+            let paths = files(folder, i);
+            let seen = member(&paths[0], size, &set.provenance)?;
+            let surfels = surfels(&paths[0], &seen)?;
+            let light = member(&paths[1], size, &set.provenance)?.rgb(&paths[1], "radiance")?;
+            let ambient = ambient(&paths[2], &member(&paths[2], ambient_size, &set.provenance)?)?;
+            Ok((Map::new(surfels), Light::new(&light, size), ambient))
+        };
+        let all: Vec<(Map, Light, Ambient)> = (0..set.grid.len()).into_par_iter().map(read).collect::<Result<_>>()?;
+        let mut field = Self { grid: set.grid, maps: Vec::new(), light: Vec::new(), ambient: Vec::new() };
+        for (map, light, ambient) in all {
+            field.maps.push(map);
+            field.light.push(light);
+            field.ambient.push(ambient);
+        }
+        Ok(field)
+    }
+
+    /// Memory that the probes take.
+    pub fn bytes(&self) -> usize {
+        let maps: usize = self.maps.iter().map(|m| m.surfels.bytes() + m.pyramid.bytes()).sum();
+        let ambient: usize =
+            self.ambient.iter().map(|a| size_of_val(a.irradiance.as_slice()) + size_of_val(a.moments.as_slice())).sum();
+        maps + ambient + self.light.iter().map(Light::bytes).sum::<usize>()
+    }
+}
+
+/// What stands for a blocked probe, which nobody asks.
+fn nothing() -> (Map, Light, Ambient) {
+    let surfels = Surfels { size: 1, distance: vec![f32::INFINITY], normal: vec![0] };
+    (Map::new(surfels), Light::new(&[Rgb::ZERO], 1), Ambient::dark())
+}
+
+/// A file of the set; an error where it is of another one.
+fn member(path: &Path, size: usize, provenance: &Provenance) -> Result<ExrImage> {
+    let image = ExrImage::read(path)?;
+    if image.provenance(path)? != provenance || [image.width, image.height] != [size; 2] {
+        return Err(Error::input(path, "from another run than its set.json says; run bake-lightfield again"));
+    }
+    Ok(image)
+}
+
+fn vectors(path: &Path, image: &ExrImage, name: &str) -> Result<Vec<Vec3>> {
+    let axis = |c: &str| image.f32(path, &format!("{name}.{c}"));
+    let (x, y, z) = (axis("X")?, axis("Y")?, axis("Z")?);
+    Ok((0..x.len()).map(|i| Vec3::new(x[i], y[i], z[i]).normalize_or(Vec3::Y)).collect())
+}
+
+fn surfels(path: &Path, image: &ExrImage) -> Result<Surfels> {
+    let distance = image.f32(path, "distance")?;
+    if let Some(d) = distance.iter().find(|d| d.is_nan() || **d < 0.0) {
+        return Err(Error::input(path, format!("channel \"distance\" holds {d}, expected metres of at least 0")));
+    }
+    let normal = vectors(path, image, "normal")?.into_iter().map(pack).collect();
+    Ok(Surfels { size: image.width, distance, normal })
+}
+
+fn ambient(path: &Path, image: &ExrImage) -> Result<Ambient> {
+    let (first, second) = (image.f32(path, "moment.1")?, image.f32(path, "moment.2")?);
+    let moments = first.into_iter().zip(second).map(|(a, b)| Vec2::new(a, b)).collect();
+    Ok(Ambient { size: image.width, irradiance: image.rgb(path, "irradiance")?, moments })
+}
+
+impl Seen {
+    /// As a file.
+    pub fn to_image(&self, provenance: &Provenance) -> ExrImage {
+        let n = self.surfels.size;
+        let mut image = ExrImage::new(n, n).with_f32("distance", self.surfels.distance.clone());
+        let normals: Vec<Vec3> = self.surfels.normal.iter().map(|&bits| crate::probe::octahedral::unpack(bits)).collect();
+        for (name, vectors) in [("normal", &normals), ("facing", &self.facing)] {
+            for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+                image = image.with_f16(&format!("{name}.{axis}"), vectors.iter().map(|v| v[k]));
+            }
+        }
+        for (name, colors) in [("direct", &self.direct), ("albedo", &self.albedo)] {
+            image = with_colors(image, name, colors);
+        }
+        image.with_provenance(provenance.clone())
+    }
+
+    /// Reads what [`Seen::to_image`] made.
+    pub fn read(path: &Path, size: usize, provenance: &Provenance) -> Result<Self> {
+        let image = member(path, size, provenance)?;
+        Ok(Self {
+            surfels: surfels(path, &image)?,
+            direct: image.rgb(path, "direct")?,
+            albedo: image.rgb(path, "albedo")?,
+            facing: vectors(path, &image, "facing")?,
+        })
+    }
+}
+
+fn with_colors(mut image: ExrImage, name: &str, colors: &[Rgb]) -> ExrImage {
+    for (k, c) in ["R", "G", "B"].into_iter().enumerate() {
+        image = image.with_f16(&format!("{name}.{c}"), colors.iter().map(|color| color[k]));
+    }
+    image
+}
+
+/// Writes a probe's radiance and ambient light.
+pub fn write_light(folder: &Path, index: usize, radiance: &[Rgb], ambient: &Ambient, provenance: &Provenance) -> Result<()> {
+    let n = (radiance.len() as f64).sqrt() as usize;
+    let [_, light, around] = files(folder, index);
+    with_colors(ExrImage::new(n, n), "radiance", radiance).with_provenance(provenance.clone()).write(&light)?;
+    let moment = |k: usize| ambient.moments.iter().map(|m| m[k]).collect();
+    ExrImage::new(ambient.size, ambient.size)
+        .with_rgb("irradiance", &ambient.irradiance)
+        .with_f32("moment.1", moment(0))
+        .with_f32("moment.2", moment(1))
+        .with_provenance(provenance.clone())
+        .write(&around)
+}

@@ -1,0 +1,165 @@
+//! `bake-lightfield`.
+
+use crate::Result;
+use crate::base::clock::seconds;
+use crate::base::named::Parameters;
+use crate::io::Provenance;
+use crate::io::jobs::{Done, Shard, complete, is_finished, touch};
+use crate::io::json;
+use crate::io::provenance::hash_file;
+use crate::method::light_field_probes::bake::{LightFieldBakeParams, look, reinjected};
+use crate::method::light_field_probes::probe::Ambient;
+use crate::method::light_field_probes::store::{LightFieldSet, baked, files, set_file, write_light};
+use crate::plan::option::stage;
+use crate::plan::{Context, Outcome};
+use crate::probe::placement::ProbeGrid;
+use crate::transport::World;
+use serde_json::json;
+use std::path::PathBuf;
+
+stage! {
+    /// Bakes light field probes.
+    BakeLightfield "bake-lightfield"
+    {
+        /// The scene.
+        scene,
+    }
+    {
+        /// The probes.
+        "--probes" probes: PathBuf,
+        /// Texels along an edge of a map.
+        "--size" size: Option<u32>,
+        /// Samples of direct light a texel.
+        "--spp" spp: Option<u32>,
+        /// Bounces of light.
+        "--bounces" bounces: Option<u32>,
+        /// Bake this shard's probes only.
+        "--shard" shard: Option<Shard>,
+        /// Folder for the probes.
+        "--output" output: PathBuf,
+    }
+}
+
+impl BakeLightfield {
+    fn params(&self) -> Result<LightFieldBakeParams> {
+        let base = LightFieldBakeParams::default();
+        let params = LightFieldBakeParams {
+            size: self.size.unwrap_or(base.size),
+            spp: self.spp.unwrap_or(base.spp),
+            bounces: self.bounces.unwrap_or(base.bounces),
+            ..base
+        };
+        params.validate()?;
+        Ok(params)
+    }
+
+    /// Refuses options that are out of range.
+    pub fn check(&self) -> Result<()> {
+        self.params().map(|_| ())
+    }
+
+    /// Reads, bakes the probes that are missing, and when all are there lets light bounce and seals the set.
+    pub fn run(&self, cx: &Context) -> Result<Outcome> {
+        let (params, clock) = (self.params()?, seconds());
+        let world = cx.opaque_world(&self.scene)?;
+        let grid = ProbeGrid::read(&self.probes)?;
+        grid.provenance.check_scene(&self.probes, &world.scene.hash)?;
+        let provenance =
+            Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params).with_input("probes", hash_file(&self.probes)?);
+        if self.is_up_to_date(&provenance) {
+            touch(&set_file(&self.output));
+            let summary = format!("{}: up to date", self.output.display());
+            return Ok(Outcome { summary, figures: json!({ "baked": 0, "up_to_date": true }), ..Outcome::default() });
+        }
+        let items = baked(&grid);
+        let is_kept = |i| is_finished(&files(&self.output, i)[0], &provenance);
+        let make = |todo: &[usize]| {
+            cx.progress().start("light field probes", todo.len() as u64);
+            for &i in todo {
+                let seen = look(&world, grid.position(i), i as u32, &params, cx.seed);
+                seen.to_image(&provenance).write(&files(&self.output, i)[0])?;
+                cx.progress().advance(1);
+            }
+            cx.progress().finish();
+            Ok(())
+        };
+        let seal = || self.seal(cx, &world, &grid, &params, &provenance);
+        let done = complete(&items, self.shard, &is_kept, make, seal)?;
+        Ok(self.outcome(&params, done, grid.len() - items.len(), clock()))
+    }
+
+    fn is_up_to_date(&self, provenance: &Provenance) -> bool {
+        let Ok(set) = LightFieldSet::read(&self.output) else { return false };
+        let whole = |i: usize| {
+            let of =
+                |(file, hash): (PathBuf, &String)| is_finished(&file, provenance) && hash_file(&file).is_ok_and(|h| h == *hash);
+            files(&self.output, i).into_iter().zip(&set.files[i]).all(of)
+        };
+        set.provenance == *provenance && set.baked().into_iter().all(whole)
+    }
+
+    /// Lets light bounce between all probes, writes what comes of it, and the set.
+    fn seal(
+        &self,
+        cx: &Context,
+        world: &World,
+        grid: &ProbeGrid,
+        params: &LightFieldBakeParams,
+        provenance: &Provenance,
+    ) -> Result<()> {
+        let (low, high) = world.scene.geometry.bounds();
+        let far = 2.0 * low.distance(high);
+        let probes = baked(grid);
+        let mut ambient: Vec<Ambient> = Vec::new();
+        cx.progress().start("bounces of light", (probes.len() * params.bounces as usize) as u64);
+        for bounce in 1..=params.bounces {
+            let mut next = vec![Ambient::dark(); grid.len()];
+            for &i in &probes {
+                let path = &files(&self.output, i)[0];
+                let seen = crate::method::light_field_probes::bake::Seen::read(path, params.size as usize, provenance)?;
+                let radiance = match bounce {
+                    1 => seen.direct.clone(),
+                    _ => reinjected(&seen, grid.position(i), grid, &ambient),
+                };
+                next[i] = Ambient::new(&seen.surfels, &radiance, params.ambient_size as usize, far);
+                if bounce == params.bounces {
+                    write_light(&self.output, i, &radiance, &next[i], provenance)?;
+                }
+                cx.progress().advance(1);
+            }
+            ambient = next;
+        }
+        cx.progress().finish();
+        let hashes = |i: usize| -> Result<[String; 3]> {
+            if grid.is_blocked(i) {
+                return Ok(Default::default());
+            }
+            let [a, b, c] = files(&self.output, i);
+            Ok([hash_file(&a)?, hash_file(&b)?, hash_file(&c)?])
+        };
+        let set = LightFieldSet {
+            bake: *params,
+            grid: grid.clone(),
+            files: (0..grid.len()).map(hashes).collect::<Result<_>>()?,
+            provenance: provenance.clone(),
+        };
+        json::write(&set_file(&self.output), &set)
+    }
+
+    fn outcome(&self, params: &LightFieldBakeParams, done: Done, blocked: usize, seconds: f64) -> Outcome {
+        let Done { made, kept, missing } = done;
+        let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
+        let LightFieldBakeParams { size, bounces, .. } = *params;
+        Outcome {
+            summary: format!(
+                "{}: {made} probes of {size} x {size} baked, {kept} kept, {blocked} blocked, {bounces} bounces, {seconds:.1} s{rest}",
+                self.output.display()
+            ),
+            figures: json!({
+                "probes": made + kept + missing, "baked": made, "missing": missing, "blocked": blocked, "size": size,
+                "bounces": bounces, "seconds": seconds,
+            }),
+            ..Outcome::default()
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Where probes stand, on a grid or anywhere: the two forms of `probes.json`.
+
+use super::placement::{PROBES_MAX, ProbeGrid};
+use crate::io::{Provenance, json};
+use crate::{Error, Result};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// How probes are placed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Placement {
+    /// On a regular grid.
+    #[default]
+    Grid,
+    /// On the ridge of the scene's distance field.
+    Sdf,
+    /// On its medial axis.
+    MedialAxis,
+}
+
+impl Placement {
+    /// All of them, with their names.
+    pub const ALL: [(Self, &str); 3] = [(Self::Grid, "grid"), (Self::Sdf, "sdf"), (Self::MedialAxis, "medial-axis")];
+}
+
+impl std::fmt::Display for Placement {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let name = Self::ALL.iter().find(|(p, _)| p == self).map_or("", |(_, name)| name);
+        f.write_str(name)
+    }
+}
+
+impl std::str::FromStr for Placement {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let found = Self::ALL.iter().find(|(_, name)| *name == text).map(|(p, _)| *p);
+        found.ok_or_else(|| format!("\"{text}\": expected {}", Self::ALL.map(|(_, name)| name).join(", ")))
+    }
+}
+
+/// Probes without an order in space: the content of a `probes.json` that is no grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProbeList {
+    /// How they were placed: any but [`Placement::Grid`].
+    pub method: Placement,
+    /// Their positions, metres; those that see most of what no other one before them sees come first.
+    pub positions: Vec<[f32; 3]>,
+    /// Where the list came from.
+    pub provenance: Provenance,
+}
+
+impl ProbeList {
+    /// Writes `probes.json`.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        json::write(path, self)
+    }
+
+    fn check(&self) -> std::result::Result<(), String> {
+        if self.method == Placement::Grid {
+            return Err("method grid: expected origin, spacing and counts".into());
+        }
+        if !(1..=PROBES_MAX).contains(&self.positions.len()) {
+            return Err(format!("{} positions, expected from 1 to {PROBES_MAX}", self.positions.len()));
+        }
+        match self.positions.iter().position(|p| !Vec3::from(*p).is_finite()) {
+            Some(i) => Err(format!("position {i} is {:?}, expected finite numbers", self.positions[i])),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a `probes.json` holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Places {
+    /// A regular grid.
+    Grid(ProbeGrid),
+    /// Any set.
+    List(ProbeList),
+}
+
+/// What tells a list from a grid.
+#[derive(Deserialize)]
+struct Head {
+    method: Option<Placement>,
+}
+
+/// How the probes of a file were placed: what a list says of itself, or `Grid`.
+pub(super) fn method(path: &Path, text: &str) -> Result<Placement> {
+    let head: Head = serde_json::from_str(text).map_err(|e| Error::at_line(path, e.line() as u32, e.to_string()))?;
+    Ok(head.method.unwrap_or_default())
+}
+
+impl Places {
+    /// Reads `probes.json`.
+    ///
+    /// # Errors
+    /// It cannot be read, was changed since it was written, or holds neither a grid nor a list.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
+        if method(path, &text)? == Placement::Grid {
+            return ProbeGrid::read(path).map(Self::Grid);
+        }
+        let list: ProbeList = json::parse(path, &text)?;
+        list.check().map_err(|message| Error::input(path, message))?;
+        Ok(Self::List(list))
+    }
+
+    /// How they were placed.
+    pub fn method(&self) -> Placement {
+        match self {
+            Self::Grid(_) => Placement::Grid,
+            Self::List(list) => list.method,
+        }
+    }
+
+    /// All positions, metres; those of blocked probes of a grid too.
+    pub fn positions(&self) -> Vec<Vec3> {
+        let list = match self {
+            Self::Grid(grid) => &grid.positions,
+            Self::List(list) => &list.positions,
+        };
+        list.iter().map(|p| Vec3::from(*p)).collect()
+    }
+
+    /// Whether a probe is of use: not inside an object or behind a wall.
+    pub fn is_used(&self, probe: usize) -> bool {
+        match self {
+            Self::Grid(grid) => !grid.is_blocked(probe),
+            Self::List(_) => true,
+        }
+    }
+
+    /// Where they came from.
+    pub fn provenance(&self) -> &Provenance {
+        match self {
+            Self::Grid(grid) => &grid.provenance,
+            Self::List(list) => &list.provenance,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::placement::Density;
+
+    #[test]
+    fn both_forms_round_trip_and_a_stage_that_needs_a_grid_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("probes.json");
+        let provenance = Provenance::new("place-probes", "abc", 0, &0);
+        let grid = ProbeGrid::in_box(Vec3::ZERO, Vec3::ONE, Density::Counts([2, 1, 1]), provenance.clone()).unwrap();
+        grid.write(&path).unwrap();
+        let places = Places::read(&path).unwrap();
+        assert_eq!((places.method(), places.positions().len()), (Placement::Grid, 2));
+        assert_eq!(places, Places::Grid(grid));
+
+        let list = ProbeList { method: Placement::MedialAxis, positions: vec![[0.1, 0.2, 0.3], [1.0, 2.0, 3.0]], provenance };
+        list.write(&path).unwrap();
+        let places = Places::read(&path).unwrap();
+        assert_eq!(places.positions()[1], Vec3::new(1.0, 2.0, 3.0));
+        assert_eq!((places.provenance().stage.as_str(), places.method()), ("place-probes", Placement::MedialAxis));
+        assert_eq!(places, Places::List(list));
+        let message = ProbeGrid::read(&path).unwrap_err().to_string();
+        assert!(message.contains("are no grid (place-probes --method medial-axis)") && !message.contains('\n'), "{message}");
+
+        let sealed = std::fs::read_to_string(&path).unwrap();
+        let good: String = sealed.lines().filter(|line| !line.contains("\"checksum\"")).map(|line| format!("{line}\n")).collect();
+        for (from, to, expected) in [
+            ("medial-axis", "magic", "unknown variant `magic`"),
+            ("medial-axis", "grid", "missing field `origin`"),
+            ("0.1", "1e99", "probes.json"),
+            ("\"positions\"", "\"places\"", "missing field `positions`"),
+            ("[\n    [", "[], \"x\": [\n    [", "0 positions, expected from 1"),
+        ] {
+            std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
+            let message = Places::read(&path).unwrap_err().to_string();
+            assert!(message.contains(expected), "{to}: {message}");
+        }
+        std::fs::write(&path, sealed.replace("0.1", "0.2")).unwrap();
+        assert!(Places::read(&path).unwrap_err().to_string().contains("has changed"));
+    }
+}

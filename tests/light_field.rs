@@ -1,0 +1,135 @@
+//! `bake-lightfield` and `render-path --method light-field-probes`.
+
+use reprobe::io::ExrImage;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+/// A room with walls of two colours, a floor that is a little rough, and a ball.
+const SCENE: &str = r#"<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="70"/>
+      <transform name="to_world"><lookat origin="0, 0, 1.7" target="0, -0.5, 0" up="0, 1, 0"/></transform></sensor>
+    <bsdf type="twosided" id="wall"><bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.5, 0.3"/></bsdf></bsdf>
+    <shape type="cube"><transform name="to_world"><scale value="2"/></transform><ref id="wall"/></shape>
+    <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><scale value="1.5"/><translate y="-1"/></transform>
+      <bsdf type="roughconductor"><float name="alpha" value="0.15"/><rgb name="eta" value="0.2"/><rgb name="k" value="3"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0" y="-0.6" z="0"/><float name="radius" value="0.35"/>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.2, 0.4, 0.7"/></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="90"/><scale value="0.8"/><translate y="1.9"/></transform>
+      <emitter type="area"><rgb name="radiance" value="4"/></emitter></shape>
+    </scene>"#;
+const PATH: &str = r#"{"fov": 70, "size": [48, 32], "frames": [{"origin": [0, 0, 1.7], "target": [0, -0.5, 0]}]}"#;
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let f = Self(tempfile::tempdir().unwrap());
+        std::fs::write(f.at("scene.xml"), SCENE).unwrap();
+        std::fs::write(f.at("path.json"), PATH).unwrap();
+        f
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn reprobe(&self, args: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args.split_whitespace()).current_dir(self.0.path()).output().unwrap()
+    }
+
+    fn run(&self, args: &str) -> String {
+        let output = self.reprobe(args);
+        assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    fn refusal(&self, args: &str) -> String {
+        let output = self.reprobe(args);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{args}: {message}");
+        assert!(message.contains("error") && !message.contains("panicked"), "{message}");
+        message
+    }
+
+    /// Mean of a layer over the frame.
+    fn mean(&self, frame: &str, layer: &str) -> [f64; 3] {
+        let path = self.at(frame);
+        let pixels = ExrImage::read(&path).unwrap().rgb(&path, layer).unwrap();
+        let sum: glam::DVec3 = pixels.iter().map(|p| p.as_dvec3()).sum();
+        (sum / pixels.len() as f64).to_array()
+    }
+
+    fn files(&self, folder: &str) -> Vec<(String, Vec<u8>)> {
+        let mut list: Vec<_> = std::fs::read_dir(self.at(folder))
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .map(|p| (p.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&p).unwrap()))
+            .collect();
+        list.sort();
+        list
+    }
+}
+
+const PLACE: &str = "place-probes scene.xml --grid 2x2x2 --bounds=-1.6,-0.8,-1.6,1.6,1.6,1.6 -o probes.json";
+const BAKE: &str = "bake-lightfield scene.xml --probes probes.json --size 128 --spp 8 --bounces 6";
+const RENDER: &str = "render-path scene.xml --path path.json --method light-field-probes";
+
+#[test]
+fn frames_have_the_light_of_path_tracing() {
+    let f = Folder::new();
+    f.run(PLACE);
+    f.run(&format!("{BAKE} -o lightfield"));
+    f.run(&format!("{RENDER} --probes lightfield --samples 32 --set direct_samples=32 -o frames"));
+    f.run("render-path scene.xml --path path.json --method path-trace --spp 256 --device cpu -o reference");
+    // The method's own approximations: irradiance of eight places for a whole room (some 7 per cent here), and light that metal reflects onto
+    // walls, which re-injection does not know (15 per cent of red, the colour that bounces most).
+    for (layer, allowed) in [("emission", 1e-3), ("diffuse", 0.1), ("glossy", 0.2)] {
+        let [ours, theirs] = ["frames", "reference"].map(|folder| f.mean(&format!("{folder}/0000.exr"), layer));
+        for (a, b) in ours.into_iter().zip(theirs) {
+            assert!((a - b).abs() < allowed * b.max(1e-3), "{layer}: {ours:?}, path tracing {theirs:?}");
+        }
+    }
+    // One way of searching finds what the other finds.
+    f.run(&format!("{RENDER} --probes lightfield --samples 32 --set direct_samples=32 --trace two-scale -o two-scale"));
+    let [a, b] = ["frames", "two-scale"].map(|folder| f.mean(&format!("{folder}/0000.exr"), "glossy"));
+    assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3 * b), "{a:?} {b:?}");
+}
+
+#[test]
+fn bakes_are_the_same_in_shards_on_one_thread_and_after_damage() {
+    let f = Folder::new();
+    f.run(PLACE);
+    let small = BAKE.replace("128", "32");
+    f.run(&format!("{small} -o whole"));
+    let whole = f.files("whole");
+    // Eight probes of three files, and the set.
+    assert_eq!(whole.len(), 25, "{:?}", whole.iter().map(|f| &f.0).collect::<Vec<_>>());
+    f.run(&format!("{small} --threads 1 --shard 1/2 -o shards"));
+    assert!(!f.at("shards/set.json").exists());
+    assert!(f.refusal(&format!("{RENDER} --probes shards -o frames")).contains("not finished"));
+    f.run(&format!("{small} --threads 1 --shard 0/2 -o shards"));
+    assert!(f.files("shards") == whole, "shards make other files than one run");
+    for (name, bytes) in &whole {
+        let damaged = if name.contains("light") { Vec::new() } else { bytes[..bytes.len() / 2].to_vec() };
+        std::fs::write(f.at("shards").join(name), damaged).unwrap();
+        f.run(&format!("{small} -o shards"));
+        assert!(f.files("shards") == whole, "{name} is not made again");
+    }
+    assert!(f.run(&format!("{small} -o whole")).contains("up to date"));
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let f = Folder::new();
+    f.run(PLACE);
+    assert!(f.refusal("bake-lightfield scene.xml --probes probes.json --size 100 -o out").contains("power of two"));
+    f.run(&format!("{} -o lightfield", BAKE.replace("128", "16")));
+    assert!(f.refusal(&format!("{RENDER} --probes lightfield --trace all -o frames")).contains("expected two-scale or hi-z"));
+    std::fs::write(f.at("other.xml"), SCENE.replace("0.35", "0.3")).unwrap();
+    let other = RENDER.replace("scene.xml", "other.xml");
+    assert!(f.refusal(&format!("{other} --probes lightfield -o frames")).contains("another scene"));
+    assert!(f.refusal(&format!("{} -o out", BAKE.replace("scene.xml", "other.xml"))).contains("another scene"));
+    // Somebody else's probes.
+    std::fs::write(f.at("lightfield/set.json"), "{}").unwrap();
+    assert!(f.refusal(&format!("{RENDER} --probes lightfield -o frames")).contains("set.json"));
+}
