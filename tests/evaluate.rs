@@ -1,10 +1,11 @@
 //! `evaluate` from the command line: what it bakes, keeps, measures and refuses.
 
+mod folder;
+
+use folder::Folder;
 use reprobe::base::math::Rgb;
 use reprobe::io::ExrImage;
 use serde_json::Value;
-use std::path::PathBuf;
-use std::process::{Command, Output};
 
 const SCENE: &str = r#"<scene version="3.0.0">
     <bsdf type="twosided" id="wall"><bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.5, 0.4"/></bsdf></bsdf>
@@ -23,55 +24,37 @@ const PATH: &str = r#"{"fov": 70, "size": [24, 16], "frames": [
 const SMALL: &str = "--size 24x16 --supersample 1 --reference-spp 4 --bake place-probes:--count=8 --bake qhmap:--size=32x16 \
     --bake bake-probes:--spp=2 --bake bake-lightmap:--spp=2 --bake bake-lightmap:--texels=2000";
 
-struct Folder(tempfile::TempDir);
+fn folder() -> Folder {
+    Folder::with(SCENE, PATH)
+}
 
-impl Folder {
-    fn new() -> Self {
-        let f = Self(tempfile::tempdir().unwrap());
-        std::fs::write(f.at("scene.xml"), SCENE).unwrap();
-        std::fs::write(f.at("path.json"), PATH).unwrap();
-        f
-    }
+fn command(args: &str) -> String {
+    format!("evaluate scene.xml --path path.json -o out {args}")
+}
 
-    fn at(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
+fn figures(f: &Folder, args: &str) -> Value {
+    serde_json::from_str(&f.success(&command(&format!("{args} --json")))).unwrap()
+}
 
-    fn evaluate(&self, args: &str) -> Output {
-        let args = format!("evaluate scene.xml --path path.json -o out {args}");
-        Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args.split_whitespace()).current_dir(self.0.path()).output().unwrap()
-    }
+fn read_json(f: &Folder, name: &str) -> Value {
+    serde_json::from_slice(&std::fs::read(f.at(name)).unwrap()).unwrap()
+}
 
-    fn figures(&self, args: &str) -> Value {
-        let output = self.evaluate(&format!("{args} --json"));
-        assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    fn json(&self, name: &str) -> Value {
-        serde_json::from_slice(&std::fs::read(self.at(name)).unwrap()).unwrap()
-    }
-
-    /// One message, exit code 2.
-    fn refusal(&self, args: &str) -> String {
-        let output = self.evaluate(args);
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{args}: {message}");
-        assert!(message.contains("error") && !message.contains("panicked"), "{message}");
-        message
-    }
+/// One message, exit code 2.
+fn refusal(f: &Folder, args: &str) -> String {
+    f.refusal(&command(args))
 }
 
 #[test]
 fn variants_share_bakes_are_measured_alike_and_a_second_run_keeps_everything() {
-    let f = Folder::new();
+    let f = folder();
     let command = format!(
         "{SMALL} --methods glossy-probes,path-trace --variant one=glossy-probes,gather.probes=1 --variant fast=path-trace,--spp=1 \
          --variant flat=glossy-probes,qhmap:--lat-long,gather.perturb.order=plane --variant paper=glossy-probes,--paper"
     );
-    let first = f.figures(&command);
+    let first = figures(&f, &command);
     let evaluation = std::fs::read(f.at("out/evaluation.json")).unwrap();
-    let json = f.json("out/evaluation.json");
+    let json = read_json(&f, "out/evaluation.json");
     let names: Vec<&str> = json["methods"].as_array().unwrap().iter().map(|m| m["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["glossy-probes", "path-trace", "one", "fast", "flat", "paper"]);
     for layer in ["glossy", "full"] {
@@ -93,7 +76,7 @@ fn variants_share_bakes_are_measured_alike_and_a_second_run_keeps_everything() {
     let probes: Vec<usize> = stages.iter().filter(|s| s.0 == "bake-probes").map(|s| s.1).collect();
     assert_eq!(probes, [3, 1], "one set of probes for three variants, one for the lat-long map");
     assert!(stages.contains(&("bake-lightmap".into(), 4)));
-    let set = f.json("out/bakes/probes/set.json");
+    let set = read_json(&f, "out/bakes/probes/set.json");
     assert_eq!(
         set["views"]["alternatives"].as_array().unwrap().len(),
         1,
@@ -106,7 +89,7 @@ fn variants_share_bakes_are_measured_alike_and_a_second_run_keeps_everything() {
         assert!(tables.contains(part), "{part}: {tables}");
     }
 
-    let second = f.figures(&command);
+    let second = figures(&f, &command);
     assert!(std::fs::read(f.at("out/evaluation.json")).unwrap() == evaluation);
     assert_eq!(bakes(&second["costs"]), stages);
     for name in names {
@@ -119,8 +102,8 @@ fn variants_share_bakes_are_measured_alike_and_a_second_run_keeps_everything() {
 
 #[test]
 fn given_bakes_and_a_given_reference_are_used_as_they_are() {
-    let f = Folder::new();
-    f.figures(&format!("{SMALL} --bakes shared"));
+    let f = folder();
+    figures(&f, &format!("{SMALL} --bakes shared"));
     std::fs::remove_dir_all(f.at("out")).unwrap();
     for frame in 0..3 {
         let image = ExrImage::new(24, 16).with_rgb("glossy", &[Rgb::splat(0.1); 24 * 16]);
@@ -128,24 +111,24 @@ fn given_bakes_and_a_given_reference_are_used_as_they_are() {
     }
     let given =
         "--probes shared/probes --lightmap shared/lightmap.exr --curvature shared/curvature.exr --size 24x16 --supersample 1";
-    let figures = f.figures(&format!("{given} --reference given --frames 0,2"));
+    let figures = figures(&f, &format!("{given} --reference given --frames 0,2"));
     let layers = &figures["methods"]["glossy-probes"];
     assert!(layers["glossy"]["rmse_rgb"].is_number() && layers["full"].is_null(), "only the layer that the reference has");
     assert!(layers["glossy"]["change"].is_null(), "frames 0 and 2 are no neighbours");
     assert!(!f.at("out/bakes").exists() && figures["costs"]["stages"].as_array().unwrap().is_empty());
     assert!(figures["costs"]["methods"]["glossy-probes"]["probes"]["baked"].as_u64().unwrap() > 0);
-    let message = f.refusal(&format!("{given} --reference given --reference-spp 3"));
+    let message = refusal(&f, &format!("{given} --reference given --reference-spp 3"));
     assert!(message.contains("cannot be used with"), "{message}");
-    let message = f.refusal("--size 48x32 --reference given");
+    let message = refusal(&f, "--size 48x32 --reference given");
     assert!(message.contains("24 x 16") && message.contains("48 x 32"), "{message}");
     std::fs::remove_file(f.at("given/0002.exr")).unwrap();
-    let message = f.refusal(&format!("{given} --reference given"));
+    let message = refusal(&f, &format!("{given} --reference given"));
     assert!(message.contains("0002.exr") && message.contains("every frame"), "{message}");
 }
 
 #[test]
 fn wrong_requests_are_refused_before_anything_is_baked() {
-    let f = Folder::new();
+    let f = folder();
     for (args, expected) in [
         ("--methods magic", "no method \"magic\""),
         ("--variant a=glossy-probes --variant a=path-trace", "two methods have this name"),
@@ -156,11 +139,11 @@ fn wrong_requests_are_refused_before_anything_is_baked() {
         ("--exposure 99", "-32 to 32"),
         ("--reference nowhere", "nowhere"),
     ] {
-        let message = f.refusal(args);
+        let message = refusal(&f, args);
         assert!(message.contains(expected), "{args}: {message}");
     }
     assert!(!f.at("out").exists());
-    let dry = |args: &str| String::from_utf8_lossy(&f.evaluate(&format!("{args} --dry-run")).stdout).into_owned();
+    let dry = |args: &str| String::from_utf8_lossy(&f.reprobe(&command(&format!("{args} --dry-run"))).stdout).into_owned();
     let text = dry("--ablations paper");
     for part in
         ["--lat-long", "--roughness-scale 0.5", "--count 6 ", "--count 24 ", "--alternative", "--seed 1", "footprint=null"]
@@ -176,9 +159,9 @@ fn wrong_requests_are_refused_before_anything_is_baked() {
 
 #[test]
 fn a_reference_noisier_than_what_it_judges_is_a_warning() {
-    let f = Folder::new();
+    let f = folder();
     let size = "--size 24x16 --reference-spp 4";
-    let output = f.evaluate(&format!("{size} --variant three=path-trace,--spp=3 --variant four=path-trace,--spp=4"));
+    let output = f.reprobe(&command(&format!("{size} --variant three=path-trace,--spp=3 --variant four=path-trace,--spp=4")));
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     assert!(said.contains("four has 4 samples a pixel, its reference 4") && said.contains("--reference-spp some 32"), "{said}");

@@ -1,8 +1,9 @@
 //! `bake-lightfield` and `render-path --method light-field-probes`.
 
+mod folder;
+
+use folder::Folder;
 use reprobe::io::ExrImage;
-use std::path::PathBuf;
-use std::process::{Command, Output};
 
 /// A room with walls of two colours, a floor that is a little rough, and a ball.
 const SCENE: &str = r#"<scene version="3.0.0">
@@ -19,55 +20,26 @@ const SCENE: &str = r#"<scene version="3.0.0">
     </scene>"#;
 const PATH: &str = r#"{"fov": 70, "size": [48, 32], "frames": [{"origin": [0, 0, 1.7], "target": [0, -0.5, 0]}]}"#;
 
-struct Folder(tempfile::TempDir);
+fn folder() -> Folder {
+    Folder::with(SCENE, PATH)
+}
 
-impl Folder {
-    fn new() -> Self {
-        let f = Self(tempfile::tempdir().unwrap());
-        std::fs::write(f.at("scene.xml"), SCENE).unwrap();
-        std::fs::write(f.at("path.json"), PATH).unwrap();
-        f
-    }
+/// Mean of a layer over the frame.
+fn mean(f: &Folder, frame: &str, layer: &str) -> [f64; 3] {
+    let path = f.at(frame);
+    let pixels = ExrImage::read(&path).unwrap().rgb(&path, layer).unwrap();
+    let sum: glam::DVec3 = pixels.iter().map(|p| p.as_dvec3()).sum();
+    (sum / pixels.len() as f64).to_array()
+}
 
-    fn at(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn reprobe(&self, args: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args.split_whitespace()).current_dir(self.0.path()).output().unwrap()
-    }
-
-    fn run(&self, args: &str) -> String {
-        let output = self.reprobe(args);
-        assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8_lossy(&output.stdout).into_owned()
-    }
-
-    fn refusal(&self, args: &str) -> String {
-        let output = self.reprobe(args);
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{args}: {message}");
-        assert!(message.contains("error") && !message.contains("panicked"), "{message}");
-        message
-    }
-
-    /// Mean of a layer over the frame.
-    fn mean(&self, frame: &str, layer: &str) -> [f64; 3] {
-        let path = self.at(frame);
-        let pixels = ExrImage::read(&path).unwrap().rgb(&path, layer).unwrap();
-        let sum: glam::DVec3 = pixels.iter().map(|p| p.as_dvec3()).sum();
-        (sum / pixels.len() as f64).to_array()
-    }
-
-    fn files(&self, folder: &str) -> Vec<(String, Vec<u8>)> {
-        let mut list: Vec<_> = std::fs::read_dir(self.at(folder))
-            .unwrap()
-            .map(|e| e.unwrap().path())
-            .map(|p| (p.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&p).unwrap()))
-            .collect();
-        list.sort();
-        list
-    }
+fn files(f: &Folder, folder: &str) -> Vec<(String, Vec<u8>)> {
+    let mut list: Vec<_> = std::fs::read_dir(f.at(folder))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .map(|p| (p.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&p).unwrap()))
+        .collect();
+    list.sort();
+    list
 }
 
 const PLACE: &str = "place-probes scene.xml --grid 2x2x2 --bounds=-1.6,-0.8,-1.6,1.6,1.6,1.6 -o probes.json";
@@ -76,54 +48,54 @@ const RENDER: &str = "render-path scene.xml --path path.json --method light-fiel
 
 #[test]
 fn frames_have_the_light_of_path_tracing() {
-    let f = Folder::new();
-    f.run(PLACE);
-    f.run(&format!("{BAKE} -o lightfield"));
-    f.run(&format!("{RENDER} --probes lightfield --samples 32 --set direct_samples=32 -o frames"));
-    f.run("render-path scene.xml --path path.json --method path-trace --spp 256 --device cpu -o reference");
+    let f = folder();
+    f.success(PLACE);
+    f.success(&format!("{BAKE} -o lightfield"));
+    f.success(&format!("{RENDER} --probes lightfield --samples 32 --set direct_samples=32 -o frames"));
+    f.success("render-path scene.xml --path path.json --method path-trace --spp 256 --device cpu -o reference");
     // The method's own approximations: irradiance of eight places for a whole room (some 7 per cent here), and light that metal reflects onto
     // walls, which re-injection does not know (15 per cent of red, the colour that bounces most).
     for (layer, allowed) in [("emission", 1e-3), ("diffuse", 0.1), ("glossy", 0.2)] {
-        let [ours, theirs] = ["frames", "reference"].map(|folder| f.mean(&format!("{folder}/0000.exr"), layer));
+        let [ours, theirs] = ["frames", "reference"].map(|folder| mean(&f, &format!("{folder}/0000.exr"), layer));
         for (a, b) in ours.into_iter().zip(theirs) {
             assert!((a - b).abs() < allowed * b.max(1e-3), "{layer}: {ours:?}, path tracing {theirs:?}");
         }
     }
     // One way of searching finds what the other finds.
-    f.run(&format!("{RENDER} --probes lightfield --samples 32 --set direct_samples=32 --trace two-scale -o two-scale"));
-    let [a, b] = ["frames", "two-scale"].map(|folder| f.mean(&format!("{folder}/0000.exr"), "glossy"));
+    f.success(&format!("{RENDER} --probes lightfield --samples 32 --set direct_samples=32 --trace two-scale -o two-scale"));
+    let [a, b] = ["frames", "two-scale"].map(|folder| mean(&f, &format!("{folder}/0000.exr"), "glossy"));
     assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3 * b), "{a:?} {b:?}");
 }
 
 #[test]
 fn bakes_are_the_same_in_shards_on_one_thread_and_after_damage() {
-    let f = Folder::new();
-    f.run(PLACE);
+    let f = folder();
+    f.success(PLACE);
     let small = BAKE.replace("128", "32");
-    f.run(&format!("{small} -o whole"));
-    let whole = f.files("whole");
+    f.success(&format!("{small} -o whole"));
+    let whole = files(&f, "whole");
     // Eight probes of three files, and the set.
     assert_eq!(whole.len(), 25, "{:?}", whole.iter().map(|f| &f.0).collect::<Vec<_>>());
-    f.run(&format!("{small} --threads 1 --shard 1/2 -o shards"));
+    f.success(&format!("{small} --threads 1 --shard 1/2 -o shards"));
     assert!(!f.at("shards/set.json").exists());
     assert!(f.refusal(&format!("{RENDER} --probes shards -o frames")).contains("not finished"));
-    f.run(&format!("{small} --threads 1 --shard 0/2 -o shards"));
-    assert!(f.files("shards") == whole, "shards make other files than one run");
+    f.success(&format!("{small} --threads 1 --shard 0/2 -o shards"));
+    assert!(files(&f, "shards") == whole, "shards make other files than one run");
     for (name, bytes) in &whole {
         let damaged = if name.contains("light") { Vec::new() } else { bytes[..bytes.len() / 2].to_vec() };
         std::fs::write(f.at("shards").join(name), damaged).unwrap();
-        f.run(&format!("{small} -o shards"));
-        assert!(f.files("shards") == whole, "{name} is not made again");
+        f.success(&format!("{small} -o shards"));
+        assert!(files(&f, "shards") == whole, "{name} is not made again");
     }
-    assert!(f.run(&format!("{small} -o whole")).contains("up to date"));
+    assert!(f.success(&format!("{small} -o whole")).contains("up to date"));
 }
 
 #[test]
 fn what_does_not_fit_is_refused() {
-    let f = Folder::new();
-    f.run(PLACE);
+    let f = folder();
+    f.success(PLACE);
     assert!(f.refusal("bake-lightfield scene.xml --probes probes.json --size 100 -o out").contains("power of two"));
-    f.run(&format!("{} -o lightfield", BAKE.replace("128", "16")));
+    f.success(&format!("{} -o lightfield", BAKE.replace("128", "16")));
     assert!(f.refusal(&format!("{RENDER} --probes lightfield --trace all -o frames")).contains("expected two-scale or hi-z"));
     std::fs::write(f.at("other.xml"), SCENE.replace("0.35", "0.3")).unwrap();
     let other = RENDER.replace("scene.xml", "other.xml");

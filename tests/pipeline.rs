@@ -1,9 +1,12 @@
 //! `run`, and what its stages do when they are interrupted or given what does not fit.
 
+mod folder;
+
+use folder::{Folder, text};
 use reprobe::io::ExrImage;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 const SCENE: &str = r#"<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="70"/>
@@ -21,43 +24,13 @@ const SCENE: &str = r#"<scene version="3.0.0">
 const PATH: &str = r#"{"fov": 70, "size": [32, 18], "frames": [
     {"origin": [0, 0, 1.5], "target": [0, -0.5, 0]}, {"origin": [0.2, 0.1, 1.4], "target": [0, -0.5, 0]}]}"#;
 
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        let f = Self(tempfile::tempdir().unwrap());
-        std::fs::write(f.at("scene.xml"), SCENE).unwrap();
-        std::fs::write(f.at("path.json"), PATH).unwrap();
-        f
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn reprobe(&self, args: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_reprobe")).args(args.split_whitespace()).current_dir(self.0.path()).output().unwrap()
-    }
-
-    /// Runs a command that must succeed; its `--json` figures.
-    fn figures(&self, args: &str) -> Value {
-        let output = self.reprobe(&format!("{args} --json"));
-        assert!(output.status.success(), "{args}: {}", text(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    /// Runs a command that must refuse its input: exit code 2, one clear message, no panic. Returns the message.
-    fn refusal(&self, args: &str) -> String {
-        let output = self.reprobe(args);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{args}: {message}");
-        assert!(message.contains("error") && !message.contains("panicked") && !message.contains("RUST_BACKTRACE"), "{message}");
-        message
-    }
+fn folder() -> Folder {
+    Folder::with(SCENE, PATH)
 }
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
+/// Runs a command that must succeed; its `--json` figures.
+fn figures(f: &Folder, args: &str) -> Value {
+    serde_json::from_str(&f.success(&format!("{args} --json"))).unwrap()
 }
 
 const RUN: &str = "run scene.xml --path path.json -o out --preset draft --probes 8 --probe-size 32x16 --spp 4 --size 32x18 \
@@ -83,8 +56,8 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 #[test]
 fn run_makes_frames_and_a_report_and_threads_do_not_change_a_bit() {
-    let f = Folder::new();
-    f.figures(&format!("{RUN} --threads 1"));
+    let f = folder();
+    figures(&f, &format!("{RUN} --threads 1"));
     let image = ExrImage::read(&f.at("out/frames/0001.exr")).unwrap();
     assert_eq!((image.width, image.height), (32, 18));
     for layer in ["glossy", "diffuse", "emission"] {
@@ -97,7 +70,7 @@ fn run_makes_frames_and_a_report_and_threads_do_not_change_a_bit() {
     }
     let first = contents(&f.at("out"));
     std::fs::remove_dir_all(f.at("out")).unwrap();
-    f.figures(&format!("{RUN} --threads 3"));
+    figures(&f, &format!("{RUN} --threads 3"));
     let second = contents(&f.at("out"));
     let names = |c: &[(PathBuf, Vec<u8>)]| c.iter().map(|(p, _)| p.clone()).collect::<Vec<_>>();
     assert_eq!(names(&first), names(&second));
@@ -135,7 +108,7 @@ fn scaled(f: &Folder, scale: f64) {
 #[test]
 fn a_room_in_any_unit_looks_as_in_metres() {
     let frames = |scale: f64| {
-        let f = Folder::new();
+        let f = folder();
         scaled(&f, scale);
         let output = f.reprobe(&format!("{RUN} --frames 0"));
         assert!(output.status.success(), "{}", text(&output.stderr));
@@ -159,39 +132,39 @@ fn a_room_in_any_unit_looks_as_in_metres() {
 
 #[test]
 fn run_goes_through_with_the_papers_text() {
-    let f = Folder::new();
-    f.figures(&format!("{RUN} --paper"));
+    let f = folder();
+    figures(&f, &format!("{RUN} --paper"));
     let frame = ExrImage::read(&f.at("out/frames/0001.exr")).unwrap();
     assert!(frame.rgb(Path::new(""), "glossy").unwrap().iter().any(|p| p.max_element() > 0.0));
 }
 
 #[test]
 fn run_compares_the_layers_that_a_reference_has() {
-    let f = Folder::new();
+    let f = folder();
     std::fs::create_dir(f.at("given")).unwrap();
     let message = f.refusal(&format!("{RUN} --reference given"));
     assert!(message.contains("given: found no EXR file"), "{message}");
     for frame in ["0000.exr", "0001.exr"] {
         ExrImage::new(32, 18).with_rgb("glossy", &[glam::Vec3::ZERO; 32 * 18]).write(&f.at("given").join(frame)).unwrap();
     }
-    f.figures(&format!("{RUN} --reference given"));
+    figures(&f, &format!("{RUN} --reference given"));
     assert!(f.at("out/report-glossy/metrics.json").exists() && !f.at("out/report").exists());
 }
 
 #[test]
 fn run_again_does_only_what_is_missing() {
-    let f = Folder::new();
-    f.figures(RUN);
+    let f = folder();
+    figures(&f, RUN);
     let before = contents(&f.at("out"));
     let bake = |figures: &Value| figures["stages"][5]["figures"].clone();
-    assert_eq!(bake(&f.figures(RUN))["baked"], 0);
+    assert_eq!(bake(&figures(&f, RUN))["baked"], 0);
     // A bake that was killed has some probes, and no set.json.
     std::fs::remove_file(f.at("out/probes/set.json")).unwrap();
     std::fs::remove_file(f.at("out/probes/0000.exr")).unwrap();
     std::fs::write(f.at("out/probes/.reprobe-x.tmp"), "half a file").unwrap();
     let message = f.refusal(&render(""));
     assert!(message.contains("set.json") && message.contains("bake-probes"), "{message}");
-    assert_eq!(bake(&f.figures(RUN))["baked"], 1);
+    assert_eq!(bake(&figures(&f, RUN))["baked"], 1);
     assert!(!f.at("out/probes/.reprobe-x.tmp").exists());
     assert!(contents(&f.at("out")) == before, "the resumed bake differs from the whole one");
 }
@@ -205,17 +178,17 @@ fn render(more: &str) -> String {
 
 #[test]
 fn inputs_from_another_scene_or_another_run_are_refused() {
-    let f = Folder::new();
-    f.figures(RUN);
+    let f = folder();
+    figures(&f, RUN);
     let message = f.refusal(&render("--supersample 2"));
     assert!(message.contains("other views") && message.contains("--for-path"), "{message}");
-    f.figures(&render("--frames 1"));
+    figures(&f, &render("--frames 1"));
     let message = f.refusal(&render("--set gather.falof=3"));
     assert!(message.contains("gather.falloff=128"), "{message}");
 
     // Another camera is no other scene, another colour is.
     std::fs::write(f.at("scene.xml"), SCENE.replace("0, 0, 1.5\"", "0, 0.1, 1.5\"")).unwrap();
-    f.figures(&render(""));
+    figures(&f, &render(""));
     std::fs::write(f.at("scene.xml"), SCENE.replace("0.6, 0.5, 0.4", "0.6, 0.5, 0.3")).unwrap();
     let message = f.refusal(&render(""));
     assert!(message.contains("another scene") && message.contains("curvature.exr"), "{message}");
@@ -226,15 +199,15 @@ fn inputs_from_another_scene_or_another_run_are_refused() {
     std::fs::write(f.at("scene.xml"), SCENE).unwrap();
 
     // Probes placed anew: the old maps do not fit.
-    f.figures("place-probes scene.xml --grid 2x2x1 -o out/probes.json");
+    figures(&f, "place-probes scene.xml --grid 2x2x1 -o out/probes.json");
     let message = f.refusal("bake-probes scene.xml --probes out/probes.json --qhmap out/qhmap -o out/new");
     assert!(message.contains("qhmap"), "{message}");
 }
 
 #[test]
 fn broken_files_are_refused_by_name() {
-    let f = Folder::new();
-    f.figures(RUN);
+    let f = folder();
+    figures(&f, RUN);
     let bytes = std::fs::read(f.at("out/probes/0002.exr")).unwrap();
     for (file, command) in [
         ("out/probes/0002.exr", render("")),
@@ -263,7 +236,7 @@ fn broken_files_are_refused_by_name() {
 
 #[test]
 fn an_output_that_cannot_be_written_is_an_error() {
-    let f = Folder::new();
+    let f = folder();
     std::fs::write(f.at("file"), "in the way").unwrap();
     let message = f.refusal("curvature scene.xml -o file/curvature.exr");
     assert!(message.contains("file"), "{message}");
@@ -282,7 +255,7 @@ fn an_output_that_cannot_be_written_is_an_error() {
 
 #[test]
 fn a_dry_run_prints_the_commands_and_writes_nothing() {
-    let f = Folder::new();
+    let f = folder();
     let output = f.reprobe(&format!("{RUN} --dry-run"));
     let lines: Vec<String> = text(&output.stdout).lines().map(str::to_owned).collect();
     let commands = ["place-probes", "resmap", "qhmap", "curvature", "bake-lightmap", "bake-probes", "render-path", "render-path"];
@@ -294,8 +267,8 @@ fn a_dry_run_prints_the_commands_and_writes_nothing() {
 
 #[test]
 fn every_baseline_writes_the_layers_and_keeps_its_frames() {
-    let f = Folder::new();
-    f.figures(&format!("{RUN} --all-texels --no-reference"));
+    let f = folder();
+    figures(&f, &format!("{RUN} --all-texels --no-reference"));
     for (method, inputs) in [
         ("ulr", "--probes out/probes --lightmap out/lightmap.exr --supersample 2"),
         ("image-space-gather", "--lightmap out/lightmap.exr --samples 20"),
@@ -303,9 +276,9 @@ fn every_baseline_writes_the_layers_and_keeps_its_frames() {
         ("path-trace", "--spp 2 --denoise"),
     ] {
         let command = format!("render-path scene.xml --path path.json --size 32x18 --method {method} -o {method} {inputs}");
-        let figures = f.figures(&format!("{command} --threads 1"));
-        assert_eq!(figures["method"], method);
-        assert!(figures["frame_ms"].as_f64().unwrap() > 0.0);
+        let first = figures(&f, &format!("{command} --threads 1"));
+        assert_eq!(first["method"], method);
+        assert!(first["frame_ms"].as_f64().unwrap() > 0.0);
         let before = contents(&f.at(method));
         let frame = ExrImage::read(&f.at(method).join("0001.exr")).unwrap();
         let [full, emission, diffuse, glossy] =
@@ -314,9 +287,9 @@ fn every_baseline_writes_the_layers_and_keeps_its_frames() {
             assert_eq!(full[i], emission[i] + diffuse[i] + glossy[i]);
         }
         assert!(glossy.iter().any(|c| c.max_element() > 0.0) && diffuse.iter().any(|c| c.max_element() > 0.0), "{method}");
-        assert_eq!(f.figures(&command)["frames"][1]["kept"], true, "{method}");
+        assert_eq!(figures(&f, &command)["frames"][1]["kept"], true, "{method}");
         std::fs::remove_file(f.at(method).join("0000.exr")).unwrap();
-        let again = f.figures(&format!("{command} --threads 3"));
+        let again = figures(&f, &format!("{command} --threads 3"));
         assert_eq!((&again["frames"][0]["kept"], &again["frames"][1]["kept"]), (&Value::Bool(false), &Value::Bool(true)));
         assert!(contents(&f.at(method)) == before, "{method}: other bits with other threads");
         std::fs::remove_file(f.at(method).join("0000.exr")).unwrap();
@@ -327,17 +300,17 @@ fn every_baseline_writes_the_layers_and_keeps_its_frames() {
 
 #[test]
 fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
-    let f = Folder::new();
-    f.figures(&format!("{RUN} --no-reference"));
+    let f = folder();
+    figures(&f, &format!("{RUN} --no-reference"));
     let command = |more: &str| format!("render-path scene.xml --path path.json --size 32x18 {more}");
     let path_trace = |more: &str| command(&format!("--method path-trace {more}"));
-    let chosen = f.figures(&path_trace("-o a --budget-ms 200"));
+    let chosen = figures(&f, &path_trace("-o a --budget-ms 200"));
     let spp = chosen["samples"].as_u64().unwrap();
     assert!(spp > 1 && chosen["budget_ms"] == 200.0, "{chosen}");
-    assert_eq!(f.figures(&path_trace(&format!("-o b --spp {spp}")))["samples"].as_u64(), Some(spp));
+    assert_eq!(figures(&f, &path_trace(&format!("-o b --spp {spp}")))["samples"].as_u64(), Some(spp));
     assert!(contents(&f.at("a")) == contents(&f.at("b")));
     let lightmap_rt = command("--method lightmap-rt --lightmap out/lightmap.exr -o c");
-    let matched = f.figures(&format!("{lightmap_rt} --match-time a"));
+    let matched = figures(&f, &format!("{lightmap_rt} --match-time a"));
     assert!(matched["samples"].as_u64().unwrap() >= 1 && matched["budget_ms"].as_f64().unwrap() > 0.0);
 
     let message = f.refusal(&path_trace("-o d --budget-ms 200 --spp 3"));
@@ -345,10 +318,10 @@ fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
     assert!(f.refusal(&path_trace("-o d --budget-ms 0")).contains("budget"));
     assert!(f.refusal(&path_trace("-o d --match-time nowhere")).contains("nowhere"));
     // Kept frames keep their times; without these, none is known.
-    f.figures(&path_trace(&format!("-o b --spp {spp}")));
-    assert!(f.figures(&path_trace("-o d --match-time b"))["budget_ms"].as_f64().unwrap() > 0.0);
+    figures(&f, &path_trace(&format!("-o b --spp {spp}")));
+    assert!(figures(&f, &path_trace("-o d --match-time b"))["budget_ms"].as_f64().unwrap() > 0.0);
     std::fs::remove_file(f.at("b/timings.json")).unwrap();
-    f.figures(&path_trace(&format!("-o b --spp {spp}")));
+    figures(&f, &path_trace(&format!("-o b --spp {spp}")));
     assert!(f.refusal(&path_trace("-o d --match-time b")).contains("render them again"));
     let ulr = command("--method ulr --probes out/probes -o d --budget-ms 200");
     assert!(f.refusal(&ulr).contains("--budget-ms: --method ulr has no use for it"));
@@ -360,7 +333,7 @@ fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
 
 #[test]
 fn nothing_is_written_over_an_input_or_a_file_of_somebody_elses() {
-    let f = Folder::new();
+    let f = folder();
     for (name, text) in [("ball.obj", "v 0 0 0\n"), ("notes.json", "{}")] {
         std::fs::write(f.at(name), text).unwrap();
     }
@@ -380,18 +353,18 @@ fn nothing_is_written_over_an_input_or_a_file_of_somebody_elses() {
 
 #[test]
 fn outputs_that_are_up_to_date_are_as_new_as_if_they_were_written() {
-    let f = Folder::new();
-    f.figures(&format!("{RUN} --no-reference"));
+    let f = folder();
+    figures(&f, &format!("{RUN} --no-reference"));
     let old = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
     let light = "bake-lightmap scene.xml -o l.exr --spp 1 --texel 0.5";
     let resmap = "resmap scene.xml --probes out/probes.json -o r --size 32x16";
     let qhmap = "qhmap r -o q --size 32x16";
     let bake = "bake-probes scene.xml --probes out/probes.json --qhmap q --spp 1 -o p";
     for (command, file) in [(light, "l.exr"), (resmap, "r/set.json"), (qhmap, "q/set.json"), (bake, "p/set.json")] {
-        f.figures(command);
+        figures(&f, command);
         let text = std::fs::read(f.at(file)).unwrap();
         std::fs::File::options().write(true).open(f.at(file)).unwrap().set_modified(old).unwrap();
-        f.figures(command);
+        figures(&f, command);
         assert!(std::fs::metadata(f.at(file)).unwrap().modified().unwrap() > old, "{command}: make would ask for it for ever");
         assert!(std::fs::read(f.at(file)).unwrap() == text, "{command}");
     }
@@ -399,7 +372,7 @@ fn outputs_that_are_up_to_date_are_as_new_as_if_they_were_written() {
 
 #[test]
 fn threads_have_a_bound() {
-    let f = Folder::new();
+    let f = folder();
     assert!(f.refusal("curvature scene.xml -o c.exr --threads 100000").contains("expected 1 to 1024"));
     assert!(f.refusal("curvature scene.xml -o c.exr --threads 0").contains("expected 1 to 1024"));
 }
@@ -407,7 +380,7 @@ fn threads_have_a_bound() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_device_behind_stdout_is_an_error_and_a_closed_pipe_is_none() {
-    let f = Folder::new();
+    let f = folder();
     let command = || {
         let mut command = Command::new(env!("CARGO_BIN_EXE_reprobe"));
         command.args(["curvature", "scene.xml", "-o", "c.exr"]).current_dir(f.0.path());
@@ -432,10 +405,10 @@ fn a_full_device_behind_stdout_is_an_error_and_a_closed_pipe_is_none() {
 
 #[test]
 fn frames_that_an_earlier_run_left_are_not_counted() {
-    let f = Folder::new();
-    f.figures(RUN);
+    let f = folder();
+    figures(&f, RUN);
     // Frame 0 stays in the folders, of another size and seed.
-    f.figures(&format!("{RUN} --size 48x27 --frames 1 --seed 7").replace("--size 32x18 ", ""));
+    figures(&f, &format!("{RUN} --size 48x27 --frames 1 --seed 7").replace("--size 32x18 ", ""));
     for report in ["report", "report-glossy"] {
         let metrics: Value =
             serde_json::from_slice(&std::fs::read(f.at("out").join(report).join("metrics.json")).unwrap()).unwrap();
@@ -446,7 +419,7 @@ fn frames_that_an_earlier_run_left_are_not_counted() {
     // All of a path's frames, where its end was cut off.
     let (first, _) = PATH.split_once("}, {").unwrap();
     std::fs::write(f.at("path.json"), format!("{first}}}]}}")).unwrap();
-    let figures = f.figures(RUN);
+    let figures = figures(&f, RUN);
     let compared = figures["stages"].as_array().unwrap().last().unwrap();
     assert!(compared["command"].as_str().unwrap().contains("--frames 0"), "{compared}");
     assert_eq!(compared["figures"]["frames"].as_array().unwrap().len(), 1);

@@ -1,6 +1,7 @@
 //! The loop that every long stage runs: items that an earlier run has finished are kept, the others of this shard are made, and when none is
 //! missing the whole is sealed.
 
+use super::provenance::hash_of;
 use super::{ExrImage, Provenance};
 use crate::Result;
 use rayon::prelude::*;
@@ -53,6 +54,12 @@ pub struct Done {
 /// Whether an earlier run with the same inputs and parameters finished this file, and nothing has changed it since.
 pub fn is_finished(file: &Path, provenance: &Provenance) -> bool {
     std::fs::read(file).is_ok_and(|bytes| ExrImage::provenance_of_whole(&bytes).as_ref() == Some(provenance))
+}
+
+/// Whether a file [`is_finished`] and has this content hash.
+pub fn is_sealed_as(hash: &str, file: &Path, provenance: &Provenance) -> bool {
+    std::fs::read(file)
+        .is_ok_and(|bytes| ExrImage::provenance_of_whole(&bytes).as_ref() == Some(provenance) && hash_of(&bytes) == *hash)
 }
 
 /// Makes a file that is up to date as new as if it were written now, so that make does not ask for it again. Where that is not

@@ -82,6 +82,10 @@ fn short(hash: &str) -> &str {
 
 /// Content hash of a file: blake3, hex.
 pub fn hash_file(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    Ok(blake3::hash(&bytes).to_hex().to_string())
+    Ok(hash_of(&std::fs::read(path).map_err(|e| Error::io(path, e))?))
+}
+
+/// The same of its bytes.
+pub fn hash_of(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
 }

@@ -3,7 +3,7 @@
 //! *Ours*: all lengths follow from the box that is filled, by way of its voxels, so that a doll's house and a hall get the same probes.
 
 use super::coverage::{Row, Sides, is_opaque};
-use super::places::Placement;
+use super::placement::Placement;
 use super::refine::{Fitness, RefineParams, refine};
 use super::select::{Enough, choose};
 use super::skeleton::field::Field;

@@ -2,7 +2,7 @@
 
 use super::coverage::{Sides, bits};
 use super::nonuniform::{Bounds, NonuniformParams, Placed, Reachable, place};
-use super::places::Placement;
+use super::placement::Placement;
 use super::refine::{RefineParams, Refined, refine};
 use super::select::{Enough, choose};
 use super::skeleton::ridge;

@@ -24,6 +24,11 @@ pub fn decode(place: Vec2) -> Vec3 {
     Vec3::new(p.x - fold.copysign(p.x), y, p.y - fold.copysign(p.y)).normalize()
 }
 
+/// The unit direction of the middle of texel `i` of an n x n map, rows from the top.
+pub fn middle(i: usize, n: usize) -> Vec3 {
+    decode((Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32)
+}
+
 /// A unit direction in four bytes, to 4e-5 radians.
 pub fn pack(d: Vec3) -> u32 {
     let [x, y] = (encode(d) * 65535.0).round().to_array().map(|v| v as u32);
@@ -95,7 +100,7 @@ mod tests {
     #[test]
     fn edges_meet_their_mirror_images() {
         let n = 16;
-        let direction = |i: usize| decode((Vec2::new((i % 16) as f32, (i / 16) as f32) + 0.5) / n as f32);
+        let direction = |i: usize| middle(i, n as usize);
         for k in 0..n {
             for (inside, outside) in [
                 (IVec2::new(k, 0), IVec2::new(k, -1)),

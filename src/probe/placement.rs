@@ -4,7 +4,6 @@
 //! middle of each, so that none lies in a wall that bounds the box; probes that no line of sight connects with a camera
 //! (those inside objects or behind walls) are marked as blocked, and take no part in the interpolation.
 
-use super::places::Placement;
 use crate::io::{Provenance, json};
 use crate::{Error, Result};
 use glam::{UVec3, Vec3};
@@ -13,6 +12,40 @@ use std::path::Path;
 
 /// Most probes that a grid may have.
 pub const PROBES_MAX: usize = 10_000;
+
+/// How probes are placed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Placement {
+    /// On a regular grid.
+    #[default]
+    Grid,
+    /// On the ridge of the scene's distance field.
+    Sdf,
+    /// On its medial axis.
+    MedialAxis,
+}
+
+impl Placement {
+    /// All of them, with their names.
+    pub const ALL: [(Self, &str); 3] = [(Self::Grid, "grid"), (Self::Sdf, "sdf"), (Self::MedialAxis, "medial-axis")];
+}
+
+impl std::fmt::Display for Placement {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let name = Self::ALL.iter().find(|(p, _)| p == self).map_or("", |(_, name)| name);
+        f.write_str(name)
+    }
+}
+
+impl std::str::FromStr for Placement {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let found = Self::ALL.iter().find(|(_, name)| *name == text).map(|(p, _)| *p);
+        found.ok_or_else(|| format!("\"{text}\": expected {}", Self::ALL.map(|(_, name)| name).join(", ")))
+    }
+}
 
 /// How densely a box is filled.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -122,6 +155,11 @@ impl ProbeGrid {
         self.blocked.binary_search(&(probe as u32)).is_ok()
     }
 
+    /// Indices of the probes that are not blocked.
+    pub fn used(&self) -> Vec<usize> {
+        (0..self.len()).filter(|&i| !self.is_blocked(i)).collect()
+    }
+
     /// The eight probes around `p` with their trilinear weights (§5.2), those of blocked probes shared out among the rest.
     /// A point outside the grid is interpolated as the nearest point of the grid's box. Along an axis with a single probe both
     /// sides name that one, the second with weight 0.
@@ -170,12 +208,17 @@ impl ProbeGrid {
     /// Reads a `probes.json` that holds a grid.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-        let method = super::places::method(path, &text)?;
+        let method = method(path, &text)?;
         if method != Placement::Grid {
             let message = format!("its probes are no grid (place-probes --method {method}); this stage needs one: --method grid");
             return Err(Error::input(path, message));
         }
-        let grid: Self = json::parse(path, &text)?;
+        Self::parse(path, &text)
+    }
+
+    /// What the text of a file with a grid says.
+    pub(super) fn parse(path: &Path, text: &str) -> Result<Self> {
+        let grid: Self = json::parse(path, text)?;
         grid.check().map_err(|message| Error::input(path, message))?;
         Ok(grid)
     }
@@ -202,6 +245,18 @@ impl ProbeGrid {
         }
         Ok(())
     }
+}
+
+/// What tells a list from a grid.
+#[derive(Deserialize)]
+struct Head {
+    method: Option<Placement>,
+}
+
+/// How the probes of a file were placed: what a list says of itself, or `Grid`.
+pub(super) fn method(path: &Path, text: &str) -> Result<Placement> {
+    let head: Head = serde_json::from_str(text).map_err(|e| Error::at_line(path, e.line() as u32, e.to_string()))?;
+    Ok(head.method.unwrap_or_default())
 }
 
 fn check_counts(counts: [u32; 3]) -> std::result::Result<(), String> {

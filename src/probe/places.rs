@@ -1,45 +1,11 @@
 //! Where probes stand, on a grid or anywhere: the two forms of `probes.json`.
 
-use super::placement::{PROBES_MAX, ProbeGrid};
+use super::placement::{PROBES_MAX, Placement, ProbeGrid, method};
 use crate::io::{Provenance, json};
 use crate::{Error, Result};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// How probes are placed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Placement {
-    /// On a regular grid.
-    #[default]
-    Grid,
-    /// On the ridge of the scene's distance field.
-    Sdf,
-    /// On its medial axis.
-    MedialAxis,
-}
-
-impl Placement {
-    /// All of them, with their names.
-    pub const ALL: [(Self, &str); 3] = [(Self::Grid, "grid"), (Self::Sdf, "sdf"), (Self::MedialAxis, "medial-axis")];
-}
-
-impl std::fmt::Display for Placement {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        let name = Self::ALL.iter().find(|(p, _)| p == self).map_or("", |(_, name)| name);
-        f.write_str(name)
-    }
-}
-
-impl std::str::FromStr for Placement {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let found = Self::ALL.iter().find(|(_, name)| *name == text).map(|(p, _)| *p);
-        found.ok_or_else(|| format!("\"{text}\": expected {}", Self::ALL.map(|(_, name)| name).join(", ")))
-    }
-}
 
 /// Probes without an order in space: the content of a `probes.json` that is no grid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -81,18 +47,6 @@ pub enum Places {
     List(ProbeList),
 }
 
-/// What tells a list from a grid.
-#[derive(Deserialize)]
-struct Head {
-    method: Option<Placement>,
-}
-
-/// How the probes of a file were placed: what a list says of itself, or `Grid`.
-pub(super) fn method(path: &Path, text: &str) -> Result<Placement> {
-    let head: Head = serde_json::from_str(text).map_err(|e| Error::at_line(path, e.line() as u32, e.to_string()))?;
-    Ok(head.method.unwrap_or_default())
-}
-
 impl Places {
     /// Reads `probes.json`.
     ///
@@ -101,7 +55,7 @@ impl Places {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
         if method(path, &text)? == Placement::Grid {
-            return ProbeGrid::read(path).map(Self::Grid);
+            return ProbeGrid::parse(path, &text).map(Self::Grid);
         }
         let list: ProbeList = json::parse(path, &text)?;
         list.check().map_err(|message| Error::input(path, message))?;
@@ -123,14 +77,6 @@ impl Places {
             Self::List(list) => &list.positions,
         };
         list.iter().map(|p| Vec3::from(*p)).collect()
-    }
-
-    /// Whether a probe is of use: not inside an object or behind a wall.
-    pub fn is_used(&self, probe: usize) -> bool {
-        match self {
-            Self::Grid(grid) => !grid.is_blocked(probe),
-            Self::List(_) => true,
-        }
     }
 
     /// Where they came from.

@@ -1,6 +1,6 @@
 //! `set.json`: written last into a folder of numbered files, so that its presence says that the folder is complete.
 
-use crate::io::{Provenance, json};
+use crate::io::{ExrImage, Provenance, json};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -55,6 +55,22 @@ impl ProbeSet {
             _ => Ok(false),
         }
     }
+}
+
+/// A file of a set, of its size where one is given.
+///
+/// # Errors
+/// It cannot be read, or is of another size or another run than `set.json` says.
+pub fn read_member(path: &Path, size: Option<[u32; 2]>, provenance: &Provenance) -> Result<ExrImage> {
+    let image = ExrImage::read(path)?;
+    let [w, h] = [image.width as u32, image.height as u32];
+    if let Some([sw, sh]) = size.filter(|size| *size != [w, h]) {
+        return Err(Error::input(path, format!("{w} x {h} pixels, expected {sw} x {sh} as set.json says")));
+    }
+    if image.provenance(path)? != provenance {
+        return Err(Error::input(path, format!("from another run than its set.json says; run {} again", provenance.stage)));
+    }
+    Ok(image)
 }
 
 /// `NNNN.exr` in a folder.

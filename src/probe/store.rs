@@ -2,7 +2,9 @@
 
 use super::file::{BakedSet, Probe};
 use super::parameter_map::{ParameterMap, map_paths};
-use crate::io::{ExrImage, json};
+use super::set::read_member;
+use crate::io::json;
+use crate::io::provenance::hash_of;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::Vec3;
@@ -41,7 +43,7 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
         }
         Ok(Self {
             folder: folder.into(),
-            hash: blake3::hash(text.as_bytes()).to_hex().to_string(),
+            hash: hash_of(text.as_bytes()),
             set,
             triangles: scene.geometry.triangles.len(),
             materials: scene.materials.len(),
@@ -76,7 +78,8 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
                 "was not baked: the set serves the views of one camera path; bake it again for these",
             ));
         }
-        let [forward_image, image] = [self.member(&forward)?, self.member(&path)?];
+        let [forward_image, image] =
+            [read_member(&forward, None, &self.set.provenance)?, read_member(&path, None, &self.set.provenance)?];
         let map = ParameterMap::from_images((&forward, &forward_image), (&path, &image))?.without_inverse();
         let [width, height] = self.set.size.map(|s| s as usize);
         if (image.width, image.height) != (width, height) {
@@ -87,23 +90,14 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
         Probe::from_image(&path, &image, map, position, self.triangles, self.materials)
     }
 
-    /// A file of the set; an error where it is of another one.
-    fn member(&self, path: &Path) -> Result<ExrImage> {
-        let image = ExrImage::read(path)?;
-        if image.provenance(path)? != &self.set.provenance {
-            return Err(Error::input(path, format!("from another run than its {SET_FILE} says; run bake-probes again")));
-        }
-        Ok(image)
-    }
-
     /// Bytes of the probes in memory.
     pub fn resident_bytes(&self) -> usize {
         self.resident.values().map(|(_, p)| p.bytes()).sum()
     }
 }
 
-/// The text of a folder's `set.json`.
-fn read_set(folder: &Path, stage: &str) -> Result<String> {
+/// The text of a folder's `set.json`, which `stage` should have written.
+pub fn read_set(folder: &Path, stage: &str) -> Result<String> {
     let path = folder.join(SET_FILE);
     std::fs::read_to_string(&path).map_err(|e| {
         let is_missing = e.kind() == std::io::ErrorKind::NotFound;
@@ -112,9 +106,9 @@ fn read_set(folder: &Path, stage: &str) -> Result<String> {
     })
 }
 
-/// Content hash of a folder's `set.json`, which `stage` should have written.
+/// Content hash of what [`read_set`] reads.
 pub fn set_hash(folder: &Path, stage: &str) -> Result<String> {
-    Ok(blake3::hash(read_set(folder, stage)?.as_bytes()).to_hex().to_string())
+    Ok(hash_of(read_set(folder, stage)?.as_bytes()))
 }
 
 /// Writes `set.json`: the last step of a bake.

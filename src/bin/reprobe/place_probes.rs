@@ -2,7 +2,7 @@
 
 use reprobe::plan::option::List;
 use reprobe::plan::stages::PlaceProbes;
-use reprobe::probe::places::Placement;
+use reprobe::probe::placement::Placement;
 use std::path::PathBuf;
 
 /// Place probes on a regular grid, or where a scene's shape asks for them

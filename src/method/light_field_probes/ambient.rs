@@ -2,7 +2,7 @@
 
 use super::probe::{Ambient, Surfels};
 use crate::base::math::Rgb;
-use crate::probe::octahedral::{decode, solid_angle, taps};
+use crate::probe::octahedral::{middle, solid_angle, taps};
 use crate::probe::placement::ProbeGrid;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -21,10 +21,7 @@ impl Ambient {
     /// Of a probe that sees `radiance` from its surfaces, in maps of `size` x `size`. `far` stands for the distance of what is not seen.
     pub fn new(surfels: &Surfels, radiance: &[Rgb], size: usize, far: f32) -> Self {
         let coarse = Coarse::new(surfels, radiance, far);
-        let texel = |i: usize| {
-            let d = decode((Vec2::new((i % size) as f32, (i / size) as f32) + 0.5) / size as f32);
-            coarse.about(d)
-        };
+        let texel = |i: usize| coarse.about(middle(i, size));
         let (irradiance, moments) = (0..size * size).into_par_iter().map(texel).unzip();
         Self { size, irradiance, moments }
     }
@@ -57,7 +54,7 @@ impl Coarse {
                 power += radiance[texel] * omega;
                 depth = [depth[0] + distance * omega, depth[1] + distance * distance * omega, depth[2] + omega];
             }
-            coarse.directions.push(decode((Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32));
+            coarse.directions.push(middle(i, n));
             coarse.power.push(power);
             coarse.depth.push(depth);
         }

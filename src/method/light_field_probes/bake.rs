@@ -10,12 +10,12 @@ use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{Parameters, within};
 use crate::base::ray::Ray;
 use crate::material::bsdf::Query;
-use crate::probe::octahedral::{decode, pack};
+use crate::probe::octahedral::{middle, pack};
 use crate::probe::placement::ProbeGrid;
 use crate::transport::path::{PathParams, scattered};
 use crate::transport::{Sampler, World};
 use crate::{Error, Result};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::FRAC_1_PI;
@@ -70,7 +70,7 @@ pub fn look(world: &World, position: Vec3, index: u32, params: &LightFieldBakePa
     let n = params.size as usize;
     let path = PathParams { max_depth: 1, ..PathParams::default() };
     let texel = |i: usize| {
-        let d = decode((Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32);
+        let d = middle(i, n);
         let Some(surface) = world.intersect(&Ray::new(position, d)) else {
             return (f32::INFINITY, -d, Rgb::ZERO, Rgb::ZERO, -d);
         };

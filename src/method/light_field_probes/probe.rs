@@ -1,7 +1,7 @@
 //! What a light field probe stores of each direction: how far the surface is, how it lies, and the light that comes from there.
 
 use crate::base::math::Rgb;
-use crate::probe::octahedral::{decode, taps, unpack};
+use crate::probe::octahedral::{decode, middle, taps, unpack};
 use glam::{Vec2, Vec3};
 use half::f16;
 
@@ -50,7 +50,7 @@ impl Surfels {
 
     /// The direction of a texel's middle.
     pub fn middle(&self, i: usize) -> Vec3 {
-        self.direction(Vec2::new((i % self.size) as f32, (i / self.size) as f32) + 0.5)
+        middle(i, self.size)
     }
 
     /// The plane of a texel; `None` where there is no surface.

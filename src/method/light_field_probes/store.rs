@@ -8,6 +8,8 @@ use crate::base::math::Rgb;
 use crate::io::{ExrImage, Provenance, json};
 use crate::probe::octahedral::pack;
 use crate::probe::placement::ProbeGrid;
+use crate::probe::set::{ProbeSet, read_member};
+use crate::probe::store::read_set;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
@@ -33,35 +35,16 @@ pub fn files(folder: &Path, index: usize) -> [PathBuf; 3] {
     ["", "_light", "_ambient"].map(|ending| folder.join(format!("{index:04}{ending}.exr")))
 }
 
-/// The set's file.
-pub fn set_file(folder: &Path) -> PathBuf {
-    folder.join("set.json")
-}
-
 impl LightFieldSet {
     /// Reads `set.json`.
     pub fn read(folder: &Path) -> Result<Self> {
-        let path = set_file(folder);
-        let text = std::fs::read_to_string(&path).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => Error::input(folder, "has no set.json: run bake-lightfield (again)"),
-            _ => Error::io(&path, e),
-        })?;
-        let set: Self = json::parse(&path, &text)?;
+        let path = ProbeSet::path(folder);
+        let set: Self = json::parse(&path, &read_set(folder, "bake-lightfield")?)?;
         if set.provenance.stage != "bake-lightfield" || set.files.len() != set.grid.len() {
             return Err(Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"));
         }
         Ok(set)
     }
-
-    /// Indices of the probes that have files.
-    pub fn baked(&self) -> Vec<usize> {
-        baked(&self.grid)
-    }
-}
-
-/// Indices of the probes of a grid that are worth a bake.
-pub fn baked(grid: &ProbeGrid) -> Vec<usize> {
-    (0..grid.len()).filter(|&i| !grid.is_blocked(i)).collect()
 }
 
 /// Light field probes in memory, by their index; blocked ones hold nothing.
@@ -81,7 +64,7 @@ impl LightField {
     /// Reads a folder that was baked from `scene`.
     pub fn load(folder: &Path, scene: &Scene) -> Result<Self> {
         let set = LightFieldSet::read(folder)?;
-        set.provenance.check_scene(&set_file(folder), &scene.hash)?;
+        set.provenance.check_scene(&ProbeSet::path(folder), &scene.hash)?;
         let (size, ambient_size) = (set.bake.size as usize, set.bake.ambient_size as usize);
         let read = |i: usize| {
             if set.grid.is_blocked(i) {
@@ -119,13 +102,9 @@ fn nothing() -> (Map, Light, Ambient) {
     (Map::new(surfels), Light::new(&[Rgb::ZERO], 1), Ambient::dark())
 }
 
-/// A file of the set; an error where it is of another one.
+/// A square file of the set.
 fn member(path: &Path, size: usize, provenance: &Provenance) -> Result<ExrImage> {
-    let image = ExrImage::read(path)?;
-    if image.provenance(path)? != provenance || [image.width, image.height] != [size; 2] {
-        return Err(Error::input(path, "from another run than its set.json says; run bake-lightfield again"));
-    }
-    Ok(image)
+    read_member(path, Some([size as u32; 2]), provenance)
 }
 
 fn vectors(path: &Path, image: &ExrImage, name: &str) -> Result<Vec<Vec3>> {

@@ -10,7 +10,7 @@ use crate::base::math::{Rgb, hash_words, unit};
 use crate::base::ray::Ray;
 use crate::exchange::{LoadOptions, load};
 use crate::io::Provenance;
-use crate::probe::octahedral::{decode, encode};
+use crate::probe::octahedral::{decode, encode, middle};
 use crate::probe::placement::{Density, ProbeGrid};
 use crate::transport::World;
 use glam::{Vec2, Vec3};
@@ -203,8 +203,7 @@ fn no_light_leaks_through_a_thin_wall() {
 fn levels_of_radiance_join_across_the_seams() {
     let n = 64;
     let smooth = |d: Vec3| Rgb::new(1.0 + d.x, 1.0 + d.y * d.z, 2.0 + d.z);
-    let radiance: Vec<Rgb> =
-        (0..n * n).map(|i| smooth(decode((Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32))).collect();
+    let radiance: Vec<Rgb> = (0..n * n).map(|i| smooth(middle(i, n))).collect();
     let light = Light::new(&radiance, n);
     for level in 0..4 {
         for k in 0..64 {

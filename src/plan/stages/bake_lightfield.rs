@@ -4,15 +4,16 @@ use crate::Result;
 use crate::base::clock::seconds;
 use crate::base::named::Parameters;
 use crate::io::Provenance;
-use crate::io::jobs::{Done, Shard, complete, is_finished, touch};
+use crate::io::jobs::{Done, Shard, complete, is_finished, is_sealed_as, touch};
 use crate::io::json;
 use crate::io::provenance::hash_file;
-use crate::method::light_field_probes::bake::{LightFieldBakeParams, look, reinjected};
+use crate::method::light_field_probes::bake::{LightFieldBakeParams, Seen, look, reinjected};
 use crate::method::light_field_probes::probe::Ambient;
-use crate::method::light_field_probes::store::{LightFieldSet, baked, files, set_file, write_light};
+use crate::method::light_field_probes::store::{LightFieldSet, files, write_light};
 use crate::plan::option::stage;
 use crate::plan::{Context, Outcome};
 use crate::probe::placement::ProbeGrid;
+use crate::probe::set::ProbeSet;
 use crate::transport::World;
 use serde_json::json;
 use std::path::PathBuf;
@@ -67,11 +68,10 @@ impl BakeLightfield {
         let provenance =
             Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params).with_input("probes", hash_file(&self.probes)?);
         if self.is_up_to_date(&provenance) {
-            touch(&set_file(&self.output));
-            let summary = format!("{}: up to date", self.output.display());
-            return Ok(Outcome { summary, figures: json!({ "baked": 0, "up_to_date": true }), ..Outcome::default() });
+            touch(&ProbeSet::path(&self.output));
+            return Ok(Outcome::up_to_date(&self.output, json!({ "baked": 0, "up_to_date": true })));
         }
-        let items = baked(&grid);
+        let items = grid.used();
         let is_kept = |i| is_finished(&files(&self.output, i)[0], &provenance);
         let make = |todo: &[usize]| {
             cx.progress().start("light field probes", todo.len() as u64);
@@ -91,11 +91,10 @@ impl BakeLightfield {
     fn is_up_to_date(&self, provenance: &Provenance) -> bool {
         let Ok(set) = LightFieldSet::read(&self.output) else { return false };
         let whole = |i: usize| {
-            let of =
-                |(file, hash): (PathBuf, &String)| is_finished(&file, provenance) && hash_file(&file).is_ok_and(|h| h == *hash);
+            let of = |(file, hash): (PathBuf, &String)| is_sealed_as(hash, &file, provenance);
             files(&self.output, i).into_iter().zip(&set.files[i]).all(of)
         };
-        set.provenance == *provenance && set.baked().into_iter().all(whole)
+        set.provenance == *provenance && set.grid.used().into_iter().all(whole)
     }
 
     /// Lets light bounce between all probes, writes what comes of it, and the set.
@@ -109,14 +108,14 @@ impl BakeLightfield {
     ) -> Result<()> {
         let (low, high) = world.scene.geometry.bounds();
         let far = 2.0 * low.distance(high);
-        let probes = baked(grid);
+        let probes = grid.used();
         let mut ambient: Vec<Ambient> = Vec::new();
         cx.progress().start("bounces of light", (probes.len() * params.bounces as usize) as u64);
         for bounce in 1..=params.bounces {
             let mut next = vec![Ambient::dark(); grid.len()];
             for &i in &probes {
                 let path = &files(&self.output, i)[0];
-                let seen = crate::method::light_field_probes::bake::Seen::read(path, params.size as usize, provenance)?;
+                let seen = Seen::read(path, params.size as usize, provenance)?;
                 let radiance = match bounce {
                     1 => seen.direct.clone(),
                     _ => reinjected(&seen, grid.position(i), grid, &ambient),
@@ -143,7 +142,7 @@ impl BakeLightfield {
             files: (0..grid.len()).map(hashes).collect::<Result<_>>()?,
             provenance: provenance.clone(),
         };
-        json::write(&set_file(&self.output), &set)
+        json::write(&ProbeSet::path(&self.output), &set)
     }
 
     fn outcome(&self, params: &LightFieldBakeParams, done: Done, blocked: usize, seconds: f64) -> Outcome {

@@ -80,8 +80,7 @@ impl BakeLightmap {
             // Of a second run at the same time, or of one with other options that was killed.
             first_store.remove()?;
             store.remove()?;
-            let summary = format!("{}: up to date", self.output.display());
-            return Ok(Outcome { summary, figures: json!({ "up_to_date": true }), ..Outcome::default() });
+            return Ok(Outcome::up_to_date(&self.output, json!({ "up_to_date": true })));
         }
         let plan = Plan::new(&world, &params, cx.seed)?;
         let planned = clock() - loaded;

@@ -4,7 +4,7 @@ use crate::base::clock::seconds;
 use crate::base::named::{Parameters, split, within};
 use crate::gpu::{GpuScene, Paths};
 use crate::io::Provenance;
-use crate::io::jobs::{Done, Shard, complete, is_finished, touch};
+use crate::io::jobs::{Done, Shard, complete, is_finished, is_sealed_as, touch};
 use crate::io::provenance::hash_file;
 use crate::lightmap::LightMap;
 use crate::method::Options;
@@ -174,8 +174,7 @@ impl BakeProbes {
         }
         if self.is_up_to_date(scene, &provenance) {
             touch(&ProbeSet::path(&self.output));
-            let summary = format!("{}: up to date", self.output.display());
-            return Ok(Outcome { summary, figures: json!({ "baked": 0, "up_to_date": true }), ..Outcome::default() });
+            return Ok(Outcome::up_to_date(&self.output, json!({ "baked": 0, "up_to_date": true })));
         }
         let wanted = match (&cameras, &served) {
             (Some(cameras), Some(served)) => Some(self.wanted(cx, &inputs, cameras, served)?),
@@ -189,7 +188,8 @@ impl BakeProbes {
     fn is_up_to_date(&self, scene: &Scene, provenance: &Provenance) -> bool {
         let Ok(ProbeStore { set, .. }) = ProbeStore::<Served>::open(&self.output, scene, 0) else { return false };
         let is_whole = |(i, hash): (usize, &String)| {
-            hash.is_empty() || self.has_finished(i, provenance) && hash_file(&numbered(&self.output, i)).is_ok_and(|h| h == *hash)
+            let [forward, inverse] = map_paths(&self.output, i);
+            hash.is_empty() || is_finished(&forward, provenance) && is_sealed_as(hash, &inverse, provenance)
         };
         set.provenance == *provenance && set.files.par_iter().enumerate().all(is_whole)
     }

@@ -5,8 +5,8 @@ use crate::io::{Provenance, picture};
 use crate::plan::option::{List, stage, text};
 use crate::plan::{Context, Outcome};
 use crate::probe::nonuniform::{Bounds, COVERAGE, NonuniformParams, Reachable, place};
-use crate::probe::placement::{Density, PROBES_MAX, ProbeGrid};
-use crate::probe::places::{Placement, Places, ProbeList};
+use crate::probe::placement::{Density, PROBES_MAX, Placement, ProbeGrid};
+use crate::probe::places::ProbeList;
 use crate::probe::plan_picture::draw;
 use crate::probe::reach::{ReachParams, blocked, reach};
 use crate::probe::refine::RefineParams;
@@ -177,9 +177,7 @@ impl PlaceProbes {
         // As the other methods would have it, so that shares can be compared.
         let bounds = Bounds { filled: ground.bounds.seen, ..ground.bounds };
         let reachable = Reachable::new(world, &bounds, &ground.cameras, &NonuniformParams::default())?;
-        let places = Places::Grid(grid.clone());
-        let used: Vec<Vec3> =
-            places.positions().into_iter().enumerate().filter(|(i, _)| places.is_used(*i)).map(|(_, p)| p).collect();
+        let used: Vec<Vec3> = grid.used().into_iter().map(|i| grid.position(i)).collect();
         write_picture(picture, world, &reachable, &used)?;
         let times = reachable.sides.times_seen(&reachable.sides.rows(world, &used));
         let seen: f64 = reachable.sides.list.iter().zip(times).filter(|(_, n)| *n > 0).map(|(s, _)| f64::from(s.area)).sum();

@@ -2,19 +2,19 @@
 
 use super::set::fill;
 use crate::base::clock::seconds;
+use crate::io::Provenance;
 use crate::io::jobs::Done;
 use crate::io::provenance::hash_file;
-use crate::io::{ExrImage, Provenance};
 use crate::method::glossy_probes::qhmap::{QhmapParams, parameter_map};
 use crate::method::glossy_probes::quasi_harmonic::Solver;
 use crate::method::glossy_probes::resmap::{density_correlation, read_m};
 use crate::plan::option::{Size, stage};
 use crate::plan::{Context, Outcome};
 use crate::probe::parameter_map::map_paths;
-use crate::probe::set::{ProbeSet, numbered};
+use crate::probe::set::{ProbeSet, numbered, read_member};
 use crate::{Error, Result};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 stage! {
@@ -75,8 +75,7 @@ impl Qhmap {
         let tally = Mutex::new(Tally::default());
         let make = |solver: &mut Solver, i: usize| {
             let path = numbered(&self.resmap, i);
-            let image = ExrImage::read(&path)?;
-            check_member(&path, &image, &from)?;
+            let image = read_member(&path, Some(from.size), &from.provenance)?;
             let (_, m) = read_m(&path, &image)?;
             let (map, epsilon) = parameter_map(solver, &m, &params)?;
             if !params.lat_long {
@@ -114,17 +113,4 @@ impl Qhmap {
             ..Outcome::default()
         }
     }
-}
-
-/// Refuses a file that does not belong to its folder's set.
-fn check_member(path: &Path, image: &ExrImage, set: &ProbeSet) -> Result<()> {
-    let found = [image.width as u32, image.height as u32];
-    if found != set.size {
-        let ([w, h], [sw, sh]) = (found, set.size);
-        return Err(Error::input(path, format!("{w} x {h} pixels, expected {sw} x {sh} as set.json says")));
-    }
-    if image.provenance(path)? != &set.provenance {
-        return Err(Error::input(path, "from another run than its set.json says; run resmap again"));
-    }
-    Ok(())
 }
