@@ -37,7 +37,7 @@ fn main() {
     let mut store = ProbeStore::<IgnoredAny>::open(Path::new(probes), &world.scene, usize::MAX).expect("probes of this scene");
     let near: Vec<_> = store
         .set
-        .grid
+        .places
         .nearest(camera.position(), 8)
         .into_iter()
         .map(|(i, t)| (i, store.probe(i).expect("a probe"), GatherParams::default().probe_weight(t)))

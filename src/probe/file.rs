@@ -219,7 +219,8 @@ impl Probe {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BakedSet<Served> {
     /// Where the probes stand.
-    pub grid: crate::probe::placement::ProbeGrid,
+    #[serde(alias = "grid")]
+    pub places: crate::probe::places::Places,
     /// Width and height of a probe, texels.
     pub size: [u32; 2],
     /// What alpha was multiplied by at the first vertex (§6.1).

@@ -184,36 +184,9 @@ impl ProbeGrid {
         result
     }
 
-    /// The eight probes nearest an eye with their trilinear weights (§5.2), or the `count` of largest weight.
-    pub fn nearest(&self, eye: Vec3, count: usize) -> Vec<(usize, f32)> {
-        // At the border of the grid, and in a grid of one layer, corners coincide.
-        let mut merged: Vec<(usize, f32)> = Vec::with_capacity(8);
-        for ProbeWeight { probe, weight } in self.around(eye) {
-            match merged.iter_mut().find(|(i, _)| *i == probe) {
-                Some((_, w)) => *w += weight,
-                None if self.is_blocked(probe) => {}
-                None => merged.push((probe, weight)),
-            }
-        }
-        merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        merged.truncate(count.clamp(1, 8));
-        merged
-    }
-
     /// Writes `probes.json`.
     pub fn write(&self, path: &Path) -> Result<()> {
         json::write(path, self)
-    }
-
-    /// Reads a `probes.json` that holds a grid.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-        let method = method(path, &text)?;
-        if method != Placement::Grid {
-            let message = format!("its probes are no grid (place-probes --method {method}); this stage needs one: --method grid");
-            return Err(Error::input(path, message));
-        }
-        Self::parse(path, &text)
     }
 
     /// What the text of a file with a grid says.
@@ -223,7 +196,7 @@ impl ProbeGrid {
         Ok(grid)
     }
 
-    fn check(&self) -> std::result::Result<(), String> {
+    pub(super) fn check(&self) -> std::result::Result<(), String> {
         check_counts(self.counts)?;
         let numbers = self.origin.iter().chain(&self.spacing);
         if numbers.clone().any(|x| !x.is_finite()) || self.spacing.iter().any(|&s| s < 0.0) {
@@ -290,6 +263,10 @@ mod tests {
             let [x, y, z] = even_counts(Vec3::new(3.1, 2.2, 4.3), n);
             assert!((x * y * z).abs_diff(n) <= n / 8, "{n}: {x}x{y}x{z}");
         }
+    }
+
+    fn read(path: &Path) -> Result<ProbeGrid> {
+        ProbeGrid::parse(path, &std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?)
     }
 
     fn grid(density: Density) -> ProbeGrid {
@@ -359,10 +336,10 @@ mod tests {
         let path = dir.path().join("probes.json");
         let grid = grid(Density::Counts([2, 1, 2]));
         grid.write(&path).unwrap();
-        assert_eq!(ProbeGrid::read(&path).unwrap(), grid);
+        assert_eq!(read(&path).unwrap(), grid);
         let sealed = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, sealed.replace("    2,", "    3,")).unwrap();
-        assert!(ProbeGrid::read(&path).unwrap_err().to_string().contains("has changed since it was written"));
+        assert!(read(&path).unwrap_err().to_string().contains("has changed since it was written"));
         // As another program would write it: without a checksum.
         let good: String = sealed.lines().filter(|line| !line.contains("\"checksum\"")).map(|line| format!("{line}\n")).collect();
         for (from, to, expected) in [
@@ -373,7 +350,7 @@ mod tests {
             ("    1,\n", "    2,\n", "4 positions, expected 8"),
         ] {
             std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
-            let message = ProbeGrid::read(&path).unwrap_err().to_string();
+            let message = read(&path).unwrap_err().to_string();
             assert!(message.contains(expected), "{to}: {message}");
         }
     }

@@ -1,10 +1,12 @@
 //! Where probes stand, on a grid or anywhere: the two forms of `probes.json`.
 
-use super::placement::{PROBES_MAX, Placement, ProbeGrid, method};
+use super::neighbors;
+use super::placement::{PROBES_MAX, Placement, ProbeGrid, ProbeWeight, method};
 use crate::io::{Provenance, json};
 use crate::{Error, Result};
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
 /// Probes without an order in space: the content of a `probes.json` that is no grid.
@@ -39,7 +41,8 @@ impl ProbeList {
 }
 
 /// What a `probes.json` holds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Places {
     /// A regular grid.
     Grid(ProbeGrid),
@@ -70,6 +73,70 @@ impl Places {
         }
     }
 
+    /// The grid, if they are one.
+    pub fn grid(&self) -> Option<&ProbeGrid> {
+        match self {
+            Self::Grid(grid) => Some(grid),
+            Self::List(_) => None,
+        }
+    }
+
+    /// Number of probes.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Grid(grid) => grid.len(),
+            Self::List(list) => list.positions.len(),
+        }
+    }
+
+    /// Never true for places that were read.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Position of a probe, metres.
+    pub fn position(&self, probe: usize) -> Vec3 {
+        match self {
+            Self::Grid(grid) => grid.position(probe),
+            Self::List(list) => Vec3::from(list.positions[probe]),
+        }
+    }
+
+    /// Whether a probe of a grid is inside an object or behind a wall. Those of a list never are.
+    pub fn is_blocked(&self, probe: usize) -> bool {
+        self.grid().is_some_and(|grid| grid.is_blocked(probe))
+    }
+
+    /// Indices of the probes that are not blocked.
+    pub fn used(&self) -> Vec<usize> {
+        (0..self.len()).filter(|&i| !self.is_blocked(i)).collect()
+    }
+
+    /// The probes around `p` with their weights, which sum to 1: of a grid the eight of its cell ([`ProbeGrid::around`]), of a list the eight
+    /// nearest ([`neighbors::around`]).
+    pub fn around(&self, p: Vec3) -> [ProbeWeight; 8] {
+        match self {
+            Self::Grid(grid) => grid.around(p),
+            Self::List(list) => neighbors::around(&list.positions, p),
+        }
+    }
+
+    /// The probes around an eye with their weights t_i (§5.2), or the `count` of largest weight, the largest first.
+    pub fn nearest(&self, eye: Vec3, count: usize) -> Vec<(usize, f32)> {
+        // At the border of the grid, and in a grid of one layer, corners coincide.
+        let mut merged: Vec<(usize, f32)> = Vec::with_capacity(8);
+        for ProbeWeight { probe, weight } in self.around(eye) {
+            match merged.iter_mut().find(|(i, _)| *i == probe) {
+                Some((_, w)) => *w += weight,
+                None if self.is_blocked(probe) => {}
+                None => merged.push((probe, weight)),
+            }
+        }
+        merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        merged.truncate(count.clamp(1, 8));
+        merged
+    }
+
     /// All positions, metres; those of blocked probes of a grid too.
     pub fn positions(&self) -> Vec<Vec3> {
         let list = match self {
@@ -88,13 +155,25 @@ impl Places {
     }
 }
 
+impl<'de> Deserialize<'de> for Places {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> std::result::Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(from)?;
+        if value.get("method").is_some() {
+            let list: ProbeList = serde_json::from_value(value).map_err(D::Error::custom)?;
+            return list.check().map(|()| Self::List(list)).map_err(D::Error::custom);
+        }
+        let grid: ProbeGrid = serde_json::from_value(value).map_err(D::Error::custom)?;
+        grid.check().map(|()| Self::Grid(grid)).map_err(D::Error::custom)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::probe::placement::Density;
 
     #[test]
-    fn both_forms_round_trip_and_a_stage_that_needs_a_grid_says_so() {
+    fn both_forms_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("probes.json");
         let provenance = Provenance::new("place-probes", "abc", 0, &0);
@@ -110,8 +189,8 @@ mod tests {
         assert_eq!(places.positions()[1], Vec3::new(1.0, 2.0, 3.0));
         assert_eq!((places.provenance().stage.as_str(), places.method()), ("place-probes", Placement::MedialAxis));
         assert_eq!(places, Places::List(list));
-        let message = ProbeGrid::read(&path).unwrap_err().to_string();
-        assert!(message.contains("are no grid (place-probes --method medial-axis)") && !message.contains('\n'), "{message}");
+        let within: Places = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(within, places);
 
         let sealed = std::fs::read_to_string(&path).unwrap();
         let good: String = sealed.lines().filter(|line| !line.contains("\"checksum\"")).map(|line| format!("{line}\n")).collect();

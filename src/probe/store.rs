@@ -38,8 +38,8 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
         let text = read_set(folder, "bake-probes")?;
         let set: BakedSet<Served> = json::parse(&path, &text)?;
         set.provenance.check_scene(&path, &scene.hash)?;
-        if set.files.len() != set.grid.len() {
-            return Err(Error::input(&path, format!("{} files for {} probes", set.files.len(), set.grid.len())));
+        if set.files.len() != set.places.len() {
+            return Err(Error::input(&path, format!("{} files for {} probes", set.files.len(), set.places.len())));
         }
         Ok(Self {
             folder: folder.into(),
@@ -86,7 +86,7 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
             let message = format!("{} x {} texels, but {SET_FILE} says {width} x {height}", image.width, image.height);
             return Err(Error::input(&path, message));
         }
-        let position: Vec3 = self.set.grid.position(index);
+        let position: Vec3 = self.set.places.position(index);
         Probe::from_image(&path, &image, map, position, self.triangles, self.materials)
     }
 

@@ -109,7 +109,7 @@ impl<'a> Renderer<'a> {
 
         let near: Vec<_> = probes
             .set
-            .grid
+            .places
             .nearest(camera.position(), self.params.gather.probes)
             .into_iter()
             .map(|(index, t)| Ok((index, probes.probe(index)?, self.params.gather.probe_weight(t))))

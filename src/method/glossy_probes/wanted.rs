@@ -11,7 +11,7 @@ use crate::Result;
 use crate::base::progress::Progress;
 use crate::probe::file::Probe;
 use crate::probe::parameter_map::ParameterMap;
-use crate::probe::placement::ProbeGrid;
+use crate::probe::places::Places;
 use crate::scene::Camera;
 use crate::scene::camera::ALL_DEPTHS;
 use crate::surface::CurvatureMap;
@@ -98,7 +98,7 @@ impl Served {
 pub fn wanted_texels(
     world: &World,
     curvature: &CurvatureMap,
-    grid: &ProbeGrid,
+    places: &Places,
     map: &dyn Fn(usize) -> Result<ParameterMap>,
     cameras: &[Camera],
     views: &Served,
@@ -110,11 +110,11 @@ pub fn wanted_texels(
     progress.start("texels that the views use", cameras.len() as u64);
     for camera in cameras {
         let most = views.choices().map(|gather| gather.probes).max().unwrap_or(1);
-        let near = grid.nearest(camera.position(), most);
+        let near = places.nearest(camera.position(), most);
         probes.retain(|index, _| near.iter().any(|(i, _)| i == index));
         for &(index, _) in &near {
             if let Entry::Vacant(entry) = probes.entry(index) {
-                let probe = entry.insert(probe_geometry(world, grid.position(index), map(index)?));
+                let probe = entry.insert(probe_geometry(world, places.position(index), map(index)?));
                 wanted.entry(index).or_insert_with(|| probe.texels.iter().map(|_| AtomicBool::new(false)).collect());
             }
         }

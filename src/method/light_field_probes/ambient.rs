@@ -1,9 +1,11 @@
 //! Diffuse light from the probes around a point, without what they see through walls (McGuire 2017, §4.3).
 
+use super::octree::{NO_PROBE, Octree, WIDTH};
 use super::probe::{Ambient, Surfels};
 use crate::base::math::Rgb;
 use crate::probe::octahedral::{middle, solid_angle, taps};
-use crate::probe::placement::ProbeGrid;
+use crate::probe::placement::ProbeWeight;
+use crate::probe::places::Places;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -13,7 +15,9 @@ const SHARPNESS: f32 = 50.0;
 /// Weight of a probe that the surface faces away from. *Paper*: small, so that no point is without any.
 const LEAST_FACING: f32 = 0.05;
 /// Weight of a probe that is likely hidden.
-const LEAST_SEEN: f32 = 1e-4;
+const LEAST_SEEN: f32 = 1e-6;
+/// Least weight by place of a probe that the octree says sees the point: more than that of hidden ones, less than that of any beside it.
+const LEAST_NEAR: f32 = 1e-3;
 /// Texels of the map that light is gathered from, along an edge.
 const COARSE: usize = 64;
 
@@ -80,16 +84,18 @@ impl Coarse {
     }
 }
 
-/// Irradiance at a point with a unit normal, from the probes around it: weighted by place, by facing, and by Chebyshev's bound on the share
-/// of surfaces about the direction that are farther than the point.
-pub fn irradiance(grid: &ProbeGrid, probes: &[Ambient], p: Vec3, normal: Vec3) -> Rgb {
+/// Irradiance at a point with a unit normal, from the probes around it, and those that the octree says see it: weighted by place, by facing,
+/// and by Chebyshev's bound on the share of surfaces about the direction that are farther than the point.
+pub fn irradiance(places: &Places, octree: Option<&Octree>, probes: &[Ambient], p: Vec3, normal: Vec3) -> Rgb {
     let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
-    for around in grid.around(p) {
+    let seeing = octree.map_or([NO_PROBE; WIDTH], |octree| octree.at(p));
+    let seeing = seeing.into_iter().filter(|&i| i != NO_PROBE).map(|i| ProbeWeight { probe: i as usize, weight: LEAST_NEAR });
+    for around in places.around(p).into_iter().chain(seeing) {
         if around.weight <= 0.0 {
             continue;
         }
         let probe = &probes[around.probe];
-        let to_point = p - grid.position(around.probe);
+        let to_point = p - places.position(around.probe);
         let distance = to_point.length();
         let d = to_point / distance.max(f32::MIN_POSITIVE);
         let facing = (-d.dot(normal)).max(LEAST_FACING);

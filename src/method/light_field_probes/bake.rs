@@ -1,19 +1,21 @@
 //! What light field probes store, by rays from where they stand.
 //!
 //! Radiance holds light that surfaces scatter towards the probe, and not what they emit: frames sample emitters themselves. The first bounce
-//! is sampled at every texel; each further one takes the irradiance of the bounce before from the probes (Wang 2019, §5: "iteratively
-//! re-injecting").
+//! is sampled at every texel; each further one is what frames would show of the surface there, lit by the bounces before (Wang 2019, §5:
+//! "iteratively re-injecting").
 
-use super::ambient::irradiance;
-use super::probe::{Ambient, Surfels};
+use super::LightFieldParams;
+use super::lobe::along_lobe;
+use super::probe::{Ambient, Light, Surfels};
+use super::store::LightField;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{Parameters, within};
 use crate::base::ray::Ray;
 use crate::material::bsdf::Query;
 use crate::probe::octahedral::{middle, pack};
-use crate::probe::placement::ProbeGrid;
 use crate::transport::path::{PathParams, scattered};
 use crate::transport::{Sampler, World};
+use crate::view::gbuffer::view_alpha;
 use crate::{Error, Result};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -30,13 +32,15 @@ pub struct LightFieldBakeParams {
     pub ambient_size: u32,
     /// Samples of direct light a texel.
     pub spp: u32,
+    /// Rays along glossy lobes a texel and bounce.
+    pub lobe_samples: u32,
     /// Bounces of light that radiance holds; 1 is direct light alone.
     pub bounces: u32,
 }
 
 impl Default for LightFieldBakeParams {
     fn default() -> Self {
-        Self { size: 512, ambient_size: 32, spp: 8, bounces: 3 }
+        Self { size: 512, ambient_size: 32, spp: 8, lobe_samples: 2, bounces: 3 }
     }
 }
 
@@ -48,6 +52,7 @@ impl Parameters for LightFieldBakeParams {
         within("--size", self.size, 16..=4096)?;
         within("ambient_size", self.ambient_size, 4..=256)?;
         within("--spp", self.spp, 1..=1 << 16)?;
+        within("lobe_samples", self.lobe_samples, 1..=1 << 16)?;
         within("--bounces", self.bounces, 1..=64)
     }
 }
@@ -99,14 +104,58 @@ pub fn look(world: &World, position: Vec3, index: u32, params: &LightFieldBakePa
     seen
 }
 
-/// Radiance with one bounce more than the irradiance of `before` holds.
-pub fn reinjected(seen: &Seen, position: Vec3, grid: &ProbeGrid, before: &[Ambient]) -> Vec<Rgb> {
+/// Is told of each probe's radiance and ambient light.
+pub type Each<'a> = &'a mut dyn FnMut(usize, &[Rgb], &Ambient) -> Result<()>;
+
+/// Gives `field` one bounce more than it holds; an unlit one direct light. `seen` gives what a probe sees, `each` is told what comes of it.
+pub fn bounce(
+    (world, field): (&World, &mut LightField),
+    seen: &dyn Fn(usize) -> Result<Seen>,
+    params: &LightFieldBakeParams,
+    (far, seed): (f32, u32),
+    each: Each,
+) -> Result<()> {
+    let (mut light, mut ambient) = (field.light.clone(), field.ambient.clone());
+    for i in field.places.used() {
+        let seen = seen(i)?;
+        let radiance = if field.is_lit() { reinjected((world, field), (&seen, i), params, (far, seed)) } else { seen.direct };
+        light[i] = Light::new(&radiance, params.size as usize);
+        ambient[i] = Ambient::new(&seen.surfels, &radiance, params.ambient_size as usize, far);
+        each(i, &radiance, &ambient[i])?;
+    }
+    (field.light, field.ambient) = (light, ambient);
+    Ok(())
+}
+
+/// Radiance with one bounce more than `field` holds: what the method itself shows of the surfaces that a probe sees, by the irradiance of its
+/// diffuse lobes and `lobe_samples` rays along the others. `far`: length of rays, metres.
+fn reinjected(
+    (world, field): (&World, &LightField),
+    (seen, index): (&Seen, usize),
+    params: &LightFieldBakeParams,
+    (far, seed): (f32, u32),
+) -> Vec<Rgb> {
+    let position = field.places.position(index);
+    let lobes = LightFieldParams { samples: params.lobe_samples, ..LightFieldParams::default() };
     let texel = |i: usize| {
-        if seen.albedo[i] == Rgb::ZERO {
-            return seen.direct[i];
+        let (d, distance) = (seen.surfels.middle(i), seen.surfels.distance[i]);
+        if !distance.is_finite() {
+            return Rgb::ZERO;
         }
-        let p = position + seen.surfels.middle(i) * seen.surfels.distance[i];
-        seen.direct[i] + seen.albedo[i] * irradiance(grid, before, p, seen.facing[i]) * FRAC_1_PI
+        let diffuse = match seen.albedo[i] {
+            Rgb::ZERO => Rgb::ZERO,
+            albedo => albedo * field.irradiance(position + d * distance, seen.facing[i]) * FRAC_1_PI,
+        };
+        let glossy = match world.intersect(&Ray::new(position, d)) {
+            Some(surface) if view_alpha(world, &surface, -d).is_some() => {
+                let stream = hash_words(&[seed, index as u32, i as u32, 1]);
+                let ray = |s| along_lobe((world, field), (&surface, -d), (&lobes, far), &mut Sampler::new(stream, s));
+                let sum: Rgb = (0..lobes.samples).map(ray).filter(|c| c.is_finite()).sum();
+                sum / lobes.samples as f32
+            }
+            _ => Rgb::ZERO,
+        };
+        seen.direct[i] + diffuse + glossy
     };
     (0..seen.direct.len()).into_par_iter().map(texel).collect()
 }

@@ -3,12 +3,14 @@
 //! Placement and Tracing*).
 //!
 //! A frame has its direct light from rays in the scene, and its indirect light from the probes alone: the glossy layer by rays along the
-//! lobes that are followed from probe to probe ([`trace`]), the diffuse layer by the irradiance of the probes around, weighted by what they
+//! lobes that are followed from probe to probe ([`trace`]; of probes in no grid [`octree`] says which), the diffuse layer by the irradiance of the probes around, weighted by what they
 //! see ([`ambient`]).
 
 pub mod ambient;
 pub mod bake;
+pub mod lobe;
 pub mod march;
+pub mod octree;
 pub mod probe;
 pub mod pyramid;
 mod row;

@@ -1,13 +1,16 @@
 //! Folders of light field probes. Each probe has `NNNN.exr`, what it sees (`distance`, `normal`, `direct`, `albedo`, `facing`),
-//! `NNNN_light.exr`, the radiance of all bounces, and `NNNN_ambient.exr`, irradiance and the moments of distance. `set.json` comes last.
+//! `NNNN_light.exr`, the radiance of all bounces, and `NNNN_ambient.exr`, irradiance and the moments of distance. Where they stand in no
+//! grid, `octree.json` says which of them see a place. `set.json` comes last.
 
+use super::ambient::irradiance;
 use super::bake::{LightFieldBakeParams, Seen};
 use super::march::Map;
+use super::octree::Octree;
 use super::probe::{Ambient, Light, Surfels};
 use crate::base::math::Rgb;
 use crate::io::{ExrImage, Provenance, json};
 use crate::probe::octahedral::pack;
-use crate::probe::placement::ProbeGrid;
+use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, read_member};
 use crate::probe::store::read_set;
 use crate::scene::Scene;
@@ -23,9 +26,13 @@ pub struct LightFieldSet {
     /// What was baked.
     pub bake: LightFieldBakeParams,
     /// Where the probes stand. Blocked ones have no files.
-    pub grid: ProbeGrid,
+    #[serde(alias = "grid")]
+    pub places: Places,
     /// Content hashes of each probe's files, in the order of [`files`].
     pub files: Vec<[String; 3]>,
+    /// That of the octree's file; empty where the probes stand in a grid.
+    #[serde(default)]
+    pub octree: String,
     /// Where it came from: the same in every file.
     pub provenance: Provenance,
 }
@@ -40,7 +47,7 @@ impl LightFieldSet {
     pub fn read(folder: &Path) -> Result<Self> {
         let path = ProbeSet::path(folder);
         let set: Self = json::parse(&path, &read_set(folder, "bake-lightfield")?)?;
-        if set.provenance.stage != "bake-lightfield" || set.files.len() != set.grid.len() {
+        if set.provenance.stage != "bake-lightfield" || set.files.len() != set.places.len() {
             return Err(Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"));
         }
         Ok(set)
@@ -51,7 +58,9 @@ impl LightFieldSet {
 #[derive(Debug, Clone)]
 pub struct LightField {
     /// Where they stand.
-    pub grid: ProbeGrid,
+    pub places: Places,
+    /// Which of them see a place; none where they stand in a grid.
+    pub octree: Option<Octree>,
     /// Surfaces.
     pub maps: Vec<Map>,
     /// Radiance.
@@ -61,14 +70,27 @@ pub struct LightField {
 }
 
 impl LightField {
+    /// Surfaces without light: `surfels` by index, blocked probes' as [`no_surfels`]. Makes the octree.
+    pub fn unlit(places: Places, surfels: Vec<Surfels>) -> Self {
+        let octree = places.grid().is_none().then(|| Octree::of(&places, &surfels));
+        let count = surfels.len();
+        Self {
+            places,
+            octree,
+            maps: surfels.into_par_iter().map(Map::new).collect(),
+            light: vec![Light::new(&[Rgb::ZERO], 1); count],
+            ambient: vec![Ambient::dark(); count],
+        }
+    }
+
     /// Reads a folder that was baked from `scene`.
     pub fn load(folder: &Path, scene: &Scene) -> Result<Self> {
         let set = LightFieldSet::read(folder)?;
         set.provenance.check_scene(&ProbeSet::path(folder), &scene.hash)?;
         let (size, ambient_size) = (set.bake.size as usize, set.bake.ambient_size as usize);
         let read = |i: usize| {
-            if set.grid.is_blocked(i) {
-                return Ok(nothing());
+            if set.places.is_blocked(i) {
+                return Ok((Map::new(no_surfels()), Light::new(&[Rgb::ZERO], 1), Ambient::dark()));
             }
             let paths = files(folder, i);
             let seen = member(&paths[0], size, &set.provenance)?;
@@ -77,8 +99,12 @@ impl LightField {
             let ambient = ambient(&paths[2], &member(&paths[2], ambient_size, &set.provenance)?)?;
             Ok((Map::new(surfels), Light::new(&light, size), ambient))
         };
-        let all: Vec<(Map, Light, Ambient)> = (0..set.grid.len()).into_par_iter().map(read).collect::<Result<_>>()?;
-        let mut field = Self { grid: set.grid, maps: Vec::new(), light: Vec::new(), ambient: Vec::new() };
+        let all: Vec<(Map, Light, Ambient)> = (0..set.places.len()).into_par_iter().map(read).collect::<Result<_>>()?;
+        let octree = match set.places {
+            Places::Grid(_) => None,
+            Places::List(_) => Some(read_octree(folder, set.places.len())?),
+        };
+        let mut field = Self { places: set.places, octree, maps: Vec::new(), light: Vec::new(), ambient: Vec::new() };
         for (map, light, ambient) in all {
             field.maps.push(map);
             field.light.push(light);
@@ -87,19 +113,42 @@ impl LightField {
         Ok(field)
     }
 
+    /// Whether the probes hold light.
+    pub fn is_lit(&self) -> bool {
+        self.ambient.iter().any(|a| a.size > 1)
+    }
+
+    /// Irradiance at a point with a unit normal, without light straight from emitters.
+    pub fn irradiance(&self, p: Vec3, normal: Vec3) -> Rgb {
+        irradiance(&self.places, self.octree.as_ref(), &self.ambient, p, normal)
+    }
+
     /// Memory that the probes take.
     pub fn bytes(&self) -> usize {
         let maps: usize = self.maps.iter().map(|m| m.surfels.bytes() + m.pyramid.bytes()).sum();
         let ambient: usize =
             self.ambient.iter().map(|a| size_of_val(a.irradiance.as_slice()) + size_of_val(a.moments.as_slice())).sum();
-        maps + ambient + self.light.iter().map(Light::bytes).sum::<usize>()
+        let octree = self.octree.as_ref().map_or(0, Octree::bytes);
+        maps + ambient + octree + self.light.iter().map(Light::bytes).sum::<usize>()
     }
 }
 
-/// What stands for a blocked probe, which nobody asks.
-fn nothing() -> (Map, Light, Ambient) {
-    let surfels = Surfels { size: 1, distance: vec![f32::INFINITY], normal: vec![0] };
-    (Map::new(surfels), Light::new(&[Rgb::ZERO], 1), Ambient::dark())
+/// What stands for the surfaces of a blocked probe, which nobody asks.
+pub fn no_surfels() -> Surfels {
+    Surfels { size: 1, distance: vec![f32::INFINITY], normal: vec![0] }
+}
+
+/// The file of a set without a grid that says which probes see a place.
+pub fn octree_path(folder: &Path) -> PathBuf {
+    folder.join("octree.json")
+}
+
+fn read_octree(folder: &Path, probes: usize) -> Result<Octree> {
+    let path = octree_path(folder);
+    let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, e))?;
+    let octree: Octree = json::parse(&path, &text)?;
+    octree.check(probes).map_err(|e| Error::input(&path, e.to_string()))?;
+    Ok(octree)
 }
 
 /// A square file of the set.

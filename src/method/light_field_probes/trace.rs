@@ -1,19 +1,19 @@
 //! A ray through many probes: each follows it as far as it sees it, and the next goes on from there.
 //!
-//! *Paper* (McGuire 2017, §4.1): the eight probes of the grid's cell, the nearest first; where one loses the ray behind a surface, the next goes
-//! on from that place. *Ours*: where all eight have lost it, those of the cell in which it was lost last go on, if they have not been asked.
-//! Every probe is asked at most once, so that a query ends.
+//! *Paper* (McGuire 2017, §4.1; Wang 2019, §4.1): the probes about the ray's origin, the nearest first; where one loses the ray behind a surface,
+//! the probes about that place are asked. They are the eight of the grid's cell, or those of the octree's leaf. *Ours*: behind those of the leaf
+//! come the eight nearest, as a leaf knows four at most. Every probe is asked at most once, so that a query ends.
 
 use super::march::{LocalRay, March, Search};
+use super::octree::{NO_PROBE, WIDTH};
 use super::store::LightField;
 use crate::base::ray::Ray;
-use crate::probe::placement::ProbeGrid;
 use glam::Vec3;
 
-/// Cells that a ray may be followed through.
-const MOST_CELLS: usize = 4;
-/// Probes that it may be followed by.
-const MOST_PROBES: usize = 8 * MOST_CELLS;
+/// Probes that a ray may be followed by.
+const MOST_PROBES: usize = 32;
+/// Stands for no probe.
+const NONE: usize = usize::MAX;
 
 /// What a ray meets, by what the probes know.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,53 +38,64 @@ pub enum Found {
     },
 }
 
+/// One probe's part in a query.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Probe.
+    pub probe: usize,
+    /// Distance along the ray from which it was asked, metres.
+    pub t: f32,
+    /// What it said.
+    pub march: March,
+}
+
 /// Follows a ray; its end must be finite.
 pub fn trace(field: &LightField, ray: &Ray, search: Search, thickness: f32) -> Found {
-    let mut asked = [usize::MAX; MOST_PROBES];
-    let mut count = 0;
+    follow(field, ray, search, thickness, &mut |_| {})
+}
+
+/// Follows a ray, and tells of every probe that is asked.
+pub fn follow(field: &LightField, ray: &Ray, search: Search, thickness: f32, tell: &mut dyn FnMut(Step)) -> Found {
+    let mut asked = [NONE; MOST_PROBES];
     let mut t = ray.t_min;
-    let mut farthest = (usize::MAX, t);
-    for _ in 0..MOST_CELLS {
-        let before = count;
-        for probe in nearest_first(&field.grid, ray.at(t)) {
-            if asked[..count].contains(&probe) {
-                continue;
-            }
-            asked[count] = probe;
-            count += 1;
-            let local = LocalRay { o: ray.o - field.grid.position(probe), d: ray.d };
-            match field.maps[probe].march(&local, [t, ray.t_max], search, thickness) {
-                March::Hit { t, texel } => return Found::Surface { probe, texel, t },
-                March::Free => return Found::Nothing,
-                March::Hidden { t: lost } => {
-                    if farthest.0 == usize::MAX || lost > farthest.1 {
-                        farthest = (probe, lost);
-                    }
-                    t = t.max(lost);
+    let mut farthest = (NONE, t);
+    for count in 0..MOST_PROBES {
+        let Some(probe) = next(field, ray.at(t), &asked[..count]) else { break };
+        asked[count] = probe;
+        let local = LocalRay { o: ray.o - field.places.position(probe), d: ray.d };
+        let march = field.maps[probe].march(&local, [t, ray.t_max], search, thickness);
+        tell(Step { probe, t, march });
+        match march {
+            March::Hit { t, texel } => return Found::Surface { probe, texel, t },
+            March::Free => return Found::Nothing,
+            March::Hidden { t: lost } => {
+                if farthest.0 == NONE || lost > farthest.1 {
+                    farthest = (probe, lost);
                 }
+                t = t.max(lost);
             }
-        }
-        if count == before {
-            break;
         }
     }
     match farthest {
-        (usize::MAX, _) => Found::Nothing,
+        (NONE, _) => Found::Nothing,
         (probe, t) => Found::Lost { probe, t },
     }
 }
 
-/// The probes of the cell around a point that are not blocked, nearest first.
-fn nearest_first(grid: &ProbeGrid, p: Vec3) -> impl Iterator<Item = usize> {
-    let mut around: [(f32, usize); 8] = grid.around(p).map(|w| {
-        let distance = grid.position(w.probe).distance_squared(p);
-        (if grid.is_blocked(w.probe) { f32::INFINITY } else { distance }, w.probe)
-    });
-    around.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut last = usize::MAX;
-    around.into_iter().filter(|(distance, _)| distance.is_finite()).map(|(_, probe)| probe).filter(move |&probe| {
-        let is_new = probe != last;
-        last = probe;
-        is_new
-    })
+/// The first probe about a place that has not been asked.
+fn next(field: &LightField, p: Vec3, asked: &[usize]) -> Option<usize> {
+    let is_new = |probe: usize| !asked.contains(&probe);
+    if let Some(octree) = &field.octree {
+        let leaf: [u32; WIDTH] = octree.at(p);
+        if let Some(probe) = leaf.into_iter().filter(|&i| i != NO_PROBE).map(|i| i as usize).find(|&i| is_new(i)) {
+            return Some(probe);
+        }
+    }
+    let around = field.places.around(p).map(|w| w.probe).into_iter();
+    let usable = around.filter(|&i| !field.places.is_blocked(i) && is_new(i));
+    let nearer = |a: &usize, b: &usize| {
+        let [a, b] = [*a, *b].map(|i| field.places.position(i).distance_squared(p));
+        a.total_cmp(&b)
+    };
+    usable.min_by(nearer)
 }

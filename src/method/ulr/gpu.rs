@@ -208,7 +208,7 @@ impl Ulr {
         gpu.clear(&t.layers.unserved);
         let params = gpu.uniform("the parameters of ulr", &self.kernel_params(eye.to_array(), view.size))?;
         let is_baked = |i: usize| !probes.set.files[i].is_empty();
-        for index in nearest(&probes.set.grid, eye, self.params.probes as usize, is_baked) {
+        for index in nearest(&probes.set.places, eye, self.params.probes as usize, is_baked) {
             clock.restart();
             let probe = probes.probe(index)?;
             let there = self.resident.get(gpu, index, GpuProbe::bytes(&probe), || GpuProbe::upload(gpu, &probe))?;

@@ -25,7 +25,7 @@ use crate::Result;
 use crate::base::math::{Rgb, floor, fraction};
 use crate::base::named::{Parameters, within};
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
-use crate::probe::placement::ProbeGrid;
+use crate::probe::places::Places;
 use crate::transport::World;
 use crate::view::MOST_SUPERSAMPLES;
 use crate::view::gbuffer::{GBuffer, Pixel, glossy};
@@ -90,9 +90,9 @@ pub struct UlrImage {
 }
 
 /// Indices of the `count` probes nearest the eye that are neither blocked nor left out by `is_baked`, nearest first.
-pub fn nearest(grid: &ProbeGrid, eye: Vec3, count: usize, is_baked: impl Fn(usize) -> bool) -> Vec<usize> {
-    let usable = (0..grid.len()).filter(|&i| !grid.is_blocked(i) && is_baked(i));
-    let mut list: Vec<(f32, usize)> = usable.map(|i| (grid.position(i).distance_squared(eye), i)).collect();
+pub fn nearest(places: &Places, eye: Vec3, count: usize, is_baked: impl Fn(usize) -> bool) -> Vec<usize> {
+    let usable = (0..places.len()).filter(|&i| !places.is_blocked(i) && is_baked(i));
+    let mut list: Vec<(f32, usize)> = usable.map(|i| (places.position(i).distance_squared(eye), i)).collect();
     list.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     list.into_iter().take(count).map(|(_, i)| i).collect()
 }

@@ -64,7 +64,7 @@ impl Renderer for OnCpu<'_> {
         let mut clock = Clock::start();
         let near = {
             let set = &store.set;
-            nearest(&set.grid, view.camera.position(), params.probes as usize, |i| !set.files[i].is_empty())
+            nearest(&set.places, view.camera.position(), params.probes as usize, |i| !set.files[i].is_empty())
         };
         let probes: Vec<_> = near.into_iter().map(|i| store.probe(i)).collect::<Result<_>>()?;
         clock.lap("load");

@@ -68,6 +68,6 @@ fn probe_cost(folder: &Path, scene: &Scene) -> Option<ProbeCost> {
     let mut store = ProbeStore::<Served>::open(folder, scene, 8).ok()?;
     let baked: Vec<usize> = (0..store.set.files.len()).filter(|&i| !store.set.files[i].is_empty()).collect();
     let one = store.probe(*baked.first()?).ok()?.bytes();
-    let count = store.set.grid.len() - store.set.grid.blocked.len();
+    let count = store.set.places.used().len();
     Some(ProbeCost { count, baked: baked.len(), size: store.set.size, bytes: (baked.len() * one) as u64 })
 }

@@ -2,19 +2,21 @@
 
 use crate::Result;
 use crate::base::clock::seconds;
+use crate::base::math::Rgb;
 use crate::base::named::Parameters;
 use crate::io::Provenance;
 use crate::io::jobs::{Done, Shard, complete, is_finished, is_sealed_as, touch};
 use crate::io::json;
 use crate::io::provenance::hash_file;
-use crate::method::light_field_probes::bake::{LightFieldBakeParams, Seen, look, reinjected};
-use crate::method::light_field_probes::probe::Ambient;
-use crate::method::light_field_probes::store::{LightFieldSet, files, write_light};
+use crate::method::light_field_probes::bake::{LightFieldBakeParams, Seen, bounce, look};
+use crate::method::light_field_probes::probe::{Ambient, Surfels};
+use crate::method::light_field_probes::store::{LightField, LightFieldSet, files, no_surfels, octree_path, write_light};
 use crate::plan::option::stage;
 use crate::plan::{Context, Outcome};
-use crate::probe::placement::ProbeGrid;
+use crate::probe::places::Places;
 use crate::probe::set::ProbeSet;
 use crate::transport::World;
+use rayon::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -63,29 +65,29 @@ impl BakeLightfield {
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         let (params, clock) = (self.params()?, seconds());
         let world = cx.opaque_world(&self.scene)?;
-        let grid = ProbeGrid::read(&self.probes)?;
-        grid.provenance.check_scene(&self.probes, &world.scene.hash)?;
+        let places = Places::read(&self.probes)?;
+        places.provenance().check_scene(&self.probes, &world.scene.hash)?;
         let provenance =
             Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params).with_input("probes", hash_file(&self.probes)?);
         if self.is_up_to_date(&provenance) {
             touch(&ProbeSet::path(&self.output));
             return Ok(Outcome::up_to_date(&self.output, json!({ "baked": 0, "up_to_date": true })));
         }
-        let items = grid.used();
+        let items = places.used();
         let is_kept = |i| is_finished(&files(&self.output, i)[0], &provenance);
         let make = |todo: &[usize]| {
             cx.progress().start("light field probes", todo.len() as u64);
             for &i in todo {
-                let seen = look(&world, grid.position(i), i as u32, &params, cx.seed);
+                let seen = look(&world, places.position(i), i as u32, &params, cx.seed);
                 seen.to_image(&provenance).write(&files(&self.output, i)[0])?;
                 cx.progress().advance(1);
             }
             cx.progress().finish();
             Ok(())
         };
-        let seal = || self.seal(cx, &world, &grid, &params, &provenance);
+        let seal = || self.seal(cx, &world, &places, &params, &provenance);
         let done = complete(&items, self.shard, &is_kept, make, seal)?;
-        Ok(self.outcome(&params, done, grid.len() - items.len(), clock()))
+        Ok(self.outcome(&params, done, places.len() - items.len(), clock()))
     }
 
     fn is_up_to_date(&self, provenance: &Provenance) -> bool {
@@ -94,7 +96,9 @@ impl BakeLightfield {
             let of = |(file, hash): (PathBuf, &String)| is_sealed_as(hash, &file, provenance);
             files(&self.output, i).into_iter().zip(&set.files[i]).all(of)
         };
-        set.provenance == *provenance && set.grid.used().into_iter().all(whole)
+        let octree = octree_path(&self.output);
+        let is_octree_whole = set.octree.is_empty() || hash_file(&octree).is_ok_and(|hash| hash == set.octree);
+        set.provenance == *provenance && is_octree_whole && set.places.used().into_iter().all(whole)
     }
 
     /// Lets light bounce between all probes, writes what comes of it, and the set.
@@ -102,35 +106,35 @@ impl BakeLightfield {
         &self,
         cx: &Context,
         world: &World,
-        grid: &ProbeGrid,
+        places: &Places,
         params: &LightFieldBakeParams,
         provenance: &Provenance,
     ) -> Result<()> {
         let (low, high) = world.scene.geometry.bounds();
-        let far = 2.0 * low.distance(high);
-        let probes = grid.used();
-        let mut ambient: Vec<Ambient> = Vec::new();
+        let far = 2.0 * low.distance(high).max(f32::MIN_POSITIVE);
+        let probes = places.used();
+        let read = |i: usize| Seen::read(&files(&self.output, i)[0], params.size as usize, provenance);
+        let surfels = |i: usize| if places.is_blocked(i) { Ok(no_surfels()) } else { read(i).map(|seen| seen.surfels) };
+        let surfels: Vec<Surfels> = (0..places.len()).into_par_iter().map(surfels).collect::<Result<_>>()?;
+        let mut field = LightField::unlit(places.clone(), surfels);
         cx.progress().start("bounces of light", (probes.len() * params.bounces as usize) as u64);
-        for bounce in 1..=params.bounces {
-            let mut next = vec![Ambient::dark(); grid.len()];
-            for &i in &probes {
-                let path = &files(&self.output, i)[0];
-                let seen = Seen::read(path, params.size as usize, provenance)?;
-                let radiance = match bounce {
-                    1 => seen.direct.clone(),
-                    _ => reinjected(&seen, grid.position(i), grid, &ambient),
-                };
-                next[i] = Ambient::new(&seen.surfels, &radiance, params.ambient_size as usize, far);
-                if bounce == params.bounces {
-                    write_light(&self.output, i, &radiance, &next[i], provenance)?;
-                }
+        for bounces in 1..=params.bounces {
+            let mut each = |i: usize, radiance: &[Rgb], ambient: &Ambient| {
                 cx.progress().advance(1);
-            }
-            ambient = next;
+                if bounces < params.bounces { Ok(()) } else { write_light(&self.output, i, radiance, ambient, provenance) }
+            };
+            bounce((world, &mut field), &read, params, (far, cx.seed), &mut each)?;
         }
         cx.progress().finish();
+        let octree = match &field.octree {
+            Some(octree) => {
+                json::write(&octree_path(&self.output), octree)?;
+                hash_file(&octree_path(&self.output))?
+            }
+            None => String::new(),
+        };
         let hashes = |i: usize| -> Result<[String; 3]> {
-            if grid.is_blocked(i) {
+            if places.is_blocked(i) {
                 return Ok(Default::default());
             }
             let [a, b, c] = files(&self.output, i);
@@ -138,8 +142,9 @@ impl BakeLightfield {
         };
         let set = LightFieldSet {
             bake: *params,
-            grid: grid.clone(),
-            files: (0..grid.len()).map(hashes).collect::<Result<_>>()?,
+            places: places.clone(),
+            files: (0..places.len()).map(hashes).collect::<Result<_>>()?,
+            octree,
             provenance: provenance.clone(),
         };
         json::write(&ProbeSet::path(&self.output), &set)

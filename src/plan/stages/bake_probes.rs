@@ -17,7 +17,7 @@ use crate::plan::views::{FrameList, views};
 use crate::plan::{Context, Outcome};
 use crate::probe::file::{BakedSet, MAX_MATERIALS};
 use crate::probe::parameter_map::{ParameterMap, map_paths};
-use crate::probe::placement::ProbeGrid;
+use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, numbered};
 use crate::probe::store::{ProbeStore, write_set};
 use crate::scene::{Camera, Scene};
@@ -80,7 +80,7 @@ stage! {
 /// The scene and what was made of it, checked against one another.
 struct Inputs {
     world: Arc<World>,
-    grid: ProbeGrid,
+    places: Places,
     maps: ProbeSet,
 }
 
@@ -144,12 +144,12 @@ impl BakeProbes {
             let message = format!("{count} materials, but a probe file tells at most {MAX_MATERIALS} apart");
             return Err(Error::input(&self.scene, message));
         }
-        let grid = ProbeGrid::read(&self.probes)?;
-        grid.provenance.check_scene(&self.probes, &scene.hash)?;
+        let places = Places::read(&self.probes)?;
+        places.provenance().check_scene(&self.probes, &scene.hash)?;
         let maps = ProbeSet::read(&self.qhmap, "qhmap")?;
         maps.provenance.check_scene(&self.qhmap, &scene.hash)?;
         maps.provenance.check_input(&self.qhmap, "probes", &hash_file(&self.probes)?)?;
-        Ok(Inputs { world, grid, maps })
+        Ok(Inputs { world, places, maps })
     }
 
     /// Reads, bakes the probes that are missing, seals the set.
@@ -199,11 +199,11 @@ impl BakeProbes {
     }
 
     fn wanted(&self, cx: &Context, inputs: &Inputs, cameras: &[Camera], served: &Served) -> Result<Wanted> {
-        let Inputs { world, grid, .. } = inputs;
+        let Inputs { world, places, .. } = inputs;
         let file = self.curvature.as_ref().ok_or_else(|| Error::Request("--for-path needs --curvature".into()))?;
         let curvature = curvature_file::read(file, world.scene.geometry.positions.len(), &world.scene.hash)?;
         let map = |i| Ok(ParameterMap::load(&self.qhmap, i)?.0);
-        wanted_texels(world, &curvature, grid, &map, cameras, served, cx.progress())
+        wanted_texels(world, &curvature, places, &map, cameras, served, cx.progress())
     }
 
     /// Bakes what is missing; what became of the probes, what was traced, and where.
@@ -216,10 +216,10 @@ impl BakeProbes {
         served: Option<Served>,
         provenance: &Provenance,
     ) -> Result<(Done, Traced, String)> {
-        let Inputs { world, grid, maps } = inputs;
+        let Inputs { world, places, maps } = inputs;
         let needed: Vec<usize> = match wanted {
             Some(w) => w.keys().copied().collect(),
-            None => (0..grid.len()).collect(),
+            None => (0..places.len()).collect(),
         };
         let lightmap = self.lightmap.as_ref().map(|file| LightMap::load(file, &world.scene)).transpose()?;
         let (mut traced, mut name) = (Traced::default(), "cpu".to_owned());
@@ -232,7 +232,7 @@ impl BakeProbes {
             let bake = Bake { device: device.as_ref().map(|d| d as &dyn Follow), ..on_cpu };
             cx.progress().start("probes", (todo.len() * maps.size[1] as usize) as u64);
             for &index in todo {
-                let mut probe = probe_geometry(world, grid.position(index), ParameterMap::load(&self.qhmap, index)?.0);
+                let mut probe = probe_geometry(world, places.position(index), ParameterMap::load(&self.qhmap, index)?.0);
                 let flags = wanted.and_then(|w| w.get(&index));
                 let want = |i: u32| flags.is_none_or(|f| f[i as usize]);
                 let Traced { texels, paths } = bake_glossy(&bake, &mut probe, index as u32, &want, cx.progress())?;
@@ -254,9 +254,9 @@ impl BakeProbes {
                 roughness_scale: params.roughness_scale,
                 mirrored: tells_mirrored,
                 views: served,
-                files: (0..grid.len()).map(hash).collect::<Result<_>>()?,
+                files: (0..places.len()).map(hash).collect::<Result<_>>()?,
                 provenance: provenance.clone(),
-                grid: grid.clone(),
+                places: places.clone(),
             };
             write_set(&self.output, &set)
         };

@@ -9,7 +9,7 @@ use crate::method::glossy_probes::resmap::{ALPHA_HALF, ResmapParams, Smoothness,
 use crate::method::glossy_probes::seen::SeenBuffers;
 use crate::plan::option::{Size, stage};
 use crate::plan::{Context, Outcome};
-use crate::probe::placement::ProbeGrid;
+use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, numbered};
 use crate::{Error, Result, io::jobs::Done};
 use serde_json::json;
@@ -75,20 +75,20 @@ impl Resmap {
     /// Reads scene and probes, makes the maps that are missing, seals them.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         let params = self.params()?;
-        let grid = ProbeGrid::read(&self.probes)?;
+        let places = Places::read(&self.probes)?;
         let world = cx.opaque_world(&self.scene)?;
-        grid.provenance.check_scene(&self.probes, &world.scene.hash)?;
+        places.provenance().check_scene(&self.probes, &world.scene.hash)?;
         let clock = seconds();
         let tracer = cx.on_gpu(|gpu| RayTracer::new(Arc::new(GpuScene::new(gpu, &world)?)))?;
         let provenance =
             Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params).with_input("probes", hash_file(&self.probes)?);
-        let set = ProbeSet { count: grid.len(), size: params.size, provenance };
+        let set = ProbeSet { count: places.len(), size: params.size, provenance };
         let (texels, glossy) = (AtomicU64::new(0), AtomicU64::new(0));
         let make = |(): &mut (), i: usize| {
             let seen = match &tracer {
-                None => SeenBuffers::cast(&world, grid.position(i), params.size),
+                None => SeenBuffers::cast(&world, places.position(i), params.size),
                 Some(tracer) => {
-                    let rays = SeenBuffers::rays(grid.position(i), params.size);
+                    let rays = SeenBuffers::rays(places.position(i), params.size);
                     SeenBuffers::from_hits(&world, params.size, &rays, &tracer.closest(&rays)?)
                 }
             };

@@ -214,7 +214,7 @@ impl<'a> Renderer<'a> {
         gpu.clear(&t.sums.sums);
         self.resident.begin_frame();
         let upload = |probe: &Probe| GpuProbe::upload(gpu, probe, &Candidates::new(self.world, probe, albedos, mirrors));
-        for (index, t_i) in probes.set.grid.nearest(eye, params.gather.probes) {
+        for (index, t_i) in probes.set.places.nearest(eye, params.gather.probes) {
             clock.restart();
             let probe = probes.probe(index)?;
             let there = self.resident.get(gpu, index, probes::bytes(&probe), || upload(&probe))?;
@@ -235,7 +235,7 @@ impl<'a> Renderer<'a> {
         }
         clock.restart();
         if let Some(next) = next {
-            let wanted = probes.set.grid.nearest(next.position(), params.gather.probes);
+            let wanted = probes.set.places.nearest(next.position(), params.gather.probes);
             upload_ahead((gpu, &mut self.resident), probes, &wanted, upload)?;
         }
         clock.lap("load");
