@@ -66,6 +66,30 @@ fn frames_have_the_light_of_path_tracing() {
     assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3 * b), "{a:?} {b:?}");
 }
 
+/// Probes in no grid: their frames, their octree, and what is said where that is damaged.
+#[test]
+fn probes_may_stand_anywhere() {
+    let f = folder();
+    f.success("place-probes scene.xml --method medial-axis --count 6 -o probes.json");
+    let small = BAKE.replace("128", "64");
+    f.success(&format!("{small} -o lightfield"));
+    let render = format!("{RENDER} --probes lightfield --samples 32 --set direct_samples=32 -o frames");
+    f.success(&render);
+    f.success("render-path scene.xml --path path.json --method path-trace --spp 256 --device cpu -o reference");
+    for (layer, allowed) in [("diffuse", 0.15), ("glossy", 0.1)] {
+        let [ours, theirs] = ["frames", "reference"].map(|folder| mean(&f, &format!("{folder}/0000.exr"), layer));
+        for (a, b) in ours.into_iter().zip(theirs) {
+            assert!((a - b).abs() < allowed * b, "{layer}: {ours:?}, path tracing {theirs:?}");
+        }
+    }
+    assert!(f.success(&format!("{small} -o lightfield")).contains("up to date"));
+    let whole = std::fs::read(f.at("lightfield/octree.json")).unwrap();
+    std::fs::write(f.at("lightfield/octree.json"), &whole[..whole.len() / 2]).unwrap();
+    assert!(f.refusal(&render.replace("frames", "others")).contains("octree.json"));
+    f.success(&format!("{small} -o lightfield"));
+    assert!(std::fs::read(f.at("lightfield/octree.json")).unwrap() == whole);
+}
+
 #[test]
 fn bakes_are_the_same_in_shards_on_one_thread_and_after_damage() {
     let f = folder();
