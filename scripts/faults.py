@@ -48,18 +48,22 @@ STAGES = {
     "curvature": ("curvature.exr", "curvature scene.xml -o curvature.exr"),
     "bake-lightmap": ("lightmap.exr", "bake-lightmap scene.xml --texels 4000 --spp 16 --first-spp 4 -o lightmap.exr"),
     "bake-probes": ("probes", "bake-probes scene.xml --probes probes.json --qhmap qhmap --lightmap lightmap.exr --spp 8 -o probes"),
+    "bake-lightfield": ("lightfield", "bake-lightfield scene.xml --probes probes.json --size 32 --spp 2 --bounces 2 -o lightfield"),
+    "light-field-probes": ("views", "render-path scene.xml --path path.json --method light-field-probes --probes lightfield -o views"),
     "render-path": ("frames", "render-path scene.xml --path path.json --probes probes --lightmap lightmap.exr --curvature curvature.exr -o frames"),
     "path-trace": ("reference", "render-path scene.xml --path path.json --method path-trace --spp 8 -o reference"),
     "compare": ("report", "compare frames reference -o report"),
 }
 # Which stages read a stage's output.
 READERS = {
-    "place-probes": ["resmap", "bake-probes"],
+    "place-probes": ["resmap", "bake-probes", "bake-lightfield"],
     "resmap": ["qhmap"],
     "qhmap": ["bake-probes"],
     "curvature": ["render-path"],
     "bake-lightmap": ["bake-probes", "render-path"],
     "bake-probes": ["render-path"],
+    "bake-lightfield": ["light-field-probes"],
+    "light-field-probes": [],
     "render-path": ["compare"],
     "path-trace": ["compare"],
     "compare": [],

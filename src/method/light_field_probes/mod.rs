@@ -8,6 +8,7 @@
 
 pub mod ambient;
 pub mod bake;
+pub mod hits;
 pub mod lobe;
 pub mod march;
 pub mod octree;
@@ -36,7 +37,7 @@ pub struct LightFieldParams {
     pub supersample: u32,
     /// Rays along the glossy lobe, a pixel of the G-buffer. *Paper* (Rodriguez 2020, Table 1): 8.
     pub samples: u32,
-    /// Samples of direct light, a pixel of the G-buffer.
+    /// Samples of direct light, a pixel of the G-buffer; 0 leaves it out.
     pub direct_samples: u32,
     /// How a probe's map is searched.
     pub search: Search,
@@ -56,7 +57,7 @@ impl Parameters for LightFieldParams {
     fn validate(&self) -> Result<()> {
         within("supersample", self.supersample, 1..=MOST_SUPERSAMPLES)?;
         within("samples", self.samples, 1..=1 << 16)?;
-        within("direct_samples", self.direct_samples, 1..=1 << 16)?;
+        within("direct_samples", self.direct_samples, 0..=1 << 16)?;
         within("thickness", self.thickness, 0.0..=1000.0)?;
         within("footprint", self.footprint, 0.0..=16.0)
     }

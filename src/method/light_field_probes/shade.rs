@@ -75,6 +75,6 @@ impl Shading<'_> {
             let mut sampler = Sampler::new(hash_words(&[stream, branch]), s);
             scattered(self.world, &p.surface, p.wo, query, None, &DIRECT, &mut sampler)
         };
-        (0..count).map(sample).sum::<Rgb>() / count as f32
+        (0..count).map(sample).sum::<Rgb>() / count.max(1) as f32
     }
 }
