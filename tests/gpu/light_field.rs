@@ -1,6 +1,7 @@
 //! Frames of light field probes. Both twins draw the same random numbers, so that pixels agree but for rounding, and for the few rays that
 //! rounding sends past an edge.
 
+use crate::frames::rmse;
 use crate::paths::difference;
 use crate::{Device, room};
 use glam::Vec3;
@@ -10,6 +11,7 @@ use reprobe::method::light_field_probes::LightFieldParams;
 use reprobe::method::light_field_probes::bake::{LightFieldBakeParams, Seen, bounce, look};
 use reprobe::method::light_field_probes::gpu::LightFieldOnGpu;
 use reprobe::method::light_field_probes::march::Search;
+use reprobe::method::light_field_probes::probe::Light;
 use reprobe::method::light_field_probes::shade::Shading;
 use reprobe::method::light_field_probes::store::{LightField, no_surfels};
 use reprobe::probe::placement::{Density, Placement, ProbeGrid};
@@ -58,6 +60,10 @@ fn check(what: &str, view: &GBuffer, gpu: &[Rgb], fine: &[Rgb], most_apart: f32)
     assert!(apart <= most_apart && mean < 2e-3 && error < 2e-3, "{what}");
 }
 
+fn sum(layer: &[Rgb]) -> f32 {
+    layer.iter().map(|c| c.element_sum()).sum()
+}
+
 pub fn frames_are_the_cpus(device: &Device) {
     let gpu = device.gpu();
     let world = room();
@@ -71,15 +77,20 @@ pub fn frames_are_the_cpus(device: &Device) {
             ("hi-z", default),
             ("two-scale", LightFieldParams { search: Search::TwoScale, ..default }),
             // Samples in more than one dispatch, single texels, and rays that are lost early.
-            ("many", LightFieldParams { samples: 37, footprint: 0.0, thickness: 0.0, ..default }),
+            ("many", LightFieldParams { samples: 19, footprint: 0.0, thickness: 0.0, ..default }),
         ] {
             let mut on_gpu = LightFieldOnGpu::new(gpu.clone(), &world, &field, &params).unwrap();
             let frame = on_gpu.frame(&camera, params.samples, 3, 5).unwrap();
             let shading = Shading { world: &world, field: &field, params, seed: 3, frame: 5, far: Shading::far(&world) };
+            let glossy = shading.glossy(&view);
+            // Much of it is what rays through the probes find.
+            let dark = LightField { light: vec![Light::new(&[Rgb::ZERO], 1); field.light.len()], ..field.clone() };
+            let direct = Shading { field: &dark, ..shading }.glossy(&view);
+            assert!(sum(&glossy) > 1.3 * sum(&direct), "{} of {} is direct light", sum(&direct), sum(&glossy));
             let layers = [
                 ("emission", &frame.layers.emission, emission_layer(&view), 0.0),
                 ("diffuse", &frame.layers.diffuse, shading.diffuse(&view), 0.01),
-                ("glossy", &frame.layers.glossy, shading.glossy(&view), 0.02),
+                ("glossy", &frame.layers.glossy, glossy, 0.02),
             ];
             for (layer, a, b, apart) in layers {
                 check(&format!("{name}, {kind}, {layer}"), &view, a, &b, apart);
@@ -90,4 +101,20 @@ pub fn frames_are_the_cpus(device: &Device) {
             assert!(on_gpu.probe_bytes() > (11 * 64 * 64 * 16) as u64);
         }
     }
+}
+
+/// The same by the command line, which tells of passes and memory.
+pub fn commands_render_them(device: &Device) {
+    let options = "--method light-field-probes --samples 4 --set direct_samples=4 --trace two-scale";
+    let (frames, timings) = device.baked().both(device, "light-field", options);
+    for images in &frames {
+        for layer in ["emission", "diffuse", "glossy", ""] {
+            // A ray that rounding sends another way is another sample.
+            assert!(rmse(images, layer) < 5e-3, "{layer}: {}", rmse(images, layer));
+        }
+    }
+    for pass in ["gbuffer", "rays", "diffuse", "composite"] {
+        assert!(timings["mean_ms"][pass].as_f64().unwrap() > 0.0, "{pass}");
+    }
+    assert!(timings["device"].is_string() && timings["gpu_probe_memory_bytes"].as_u64().unwrap() > 18 * 32 * 32 * 8 / 2);
 }
