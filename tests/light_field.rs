@@ -128,3 +128,19 @@ fn what_does_not_fit_is_refused() {
     std::fs::write(f.at("lightfield/set.json"), "{}").unwrap();
     assert!(f.refusal(&format!("{RENDER} --probes lightfield -o frames")).contains("set.json"));
 }
+
+#[test]
+fn evaluations_tell_what_the_probes_take() {
+    let f = folder();
+    let bakes = "--bake place-probes:--count=8 --bake bake-lightfield:--size=16 --bake bake-lightfield:--spp=1";
+    let options = "--methods light-field-probes --size 24x16 --supersample 1 --reference-spp 2 --device cpu --json";
+    let text = f.success(&format!("evaluate scene.xml --path path.json -o evaluation {options} {bakes}"));
+    let figures: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let probes = &figures["costs"]["methods"]["light-field-probes"]["probes"];
+    let count = probes["count"].as_u64().unwrap();
+    assert!((2..=12).contains(&count), "{probes}");
+    assert_eq!((&probes["baked"], &probes["size"]), (&count.into(), &serde_json::json!([16, 16])));
+    // Two words a texel and one for each of 341 squares, three halves for each of 336, five floats for each of 32 x 32.
+    assert_eq!(probes["bytes"], count * (256 * 8 + 341 * 4 + 336 * 6 + 1024 * 20));
+    assert!(std::fs::read_to_string(f.at("evaluation/evaluation.md")).unwrap().contains("| 16 x 16 |"));
+}

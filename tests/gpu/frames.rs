@@ -27,7 +27,7 @@ const SCENE: &str = r#"<scene version="3.0.0">
 const PATH: &str = r#"{"fov": 70, "size": [96, 54], "frames": [
     {"origin": [0, 0, 1.5], "target": [0, -0.5, 0]}, {"origin": [0.2, 0.1, 1.4], "target": [-0.3, -0.5, 0]}]}"#;
 
-/// A folder with baked probes, a light map and curvatures.
+/// A folder with baked probes of both kinds, a light map and curvatures.
 pub struct Baked(tempfile::TempDir);
 
 impl Baked {
@@ -38,6 +38,9 @@ impl Baked {
         let run = "run scene.xml --path path.json -o out --preset draft --probes 18 --probe-size 128x64 --spp 4 --all-texels \
             --lightmap-spp 4 --texel 0.1 --no-reference --quiet";
         let output = baked.reprobe(run);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let bake = "bake-lightfield scene.xml --probes out/probes.json -o out/lightfield --size 32 --spp 2 --bounces 2 --quiet";
+        let output = baked.reprobe(bake);
         assert!(output.status.success(), "{}", text(&output.stderr));
         baked
     }
@@ -54,6 +57,7 @@ impl Baked {
     pub fn render(&self, name: &str, device: Option<&Device>, options: &str) -> Output {
         let choice = device.map_or("cpu", |d| d.name.as_str());
         let inputs = match options.split_whitespace().nth(1).filter(|_| options.starts_with("--method")) {
+            Some("light-field-probes") => "--probes out/lightfield",
             Some("ulr") => "--probes out/probes --lightmap out/lightmap.exr",
             Some(_) => "--lightmap out/lightmap.exr",
             None => "--probes out/probes --lightmap out/lightmap.exr --curvature out/curvature.exr",

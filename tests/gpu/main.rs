@@ -9,6 +9,7 @@ mod baselines;
 mod denoise;
 mod filter;
 mod frames;
+mod light_field;
 mod paths;
 mod rays;
 mod ulr;
@@ -84,6 +85,8 @@ const TWICE: &[Test] = tests![
     denoise::denoised_frames_are_the_cpus,
     denoise::guides_of_every_model_are_the_cpus,
     frames::frames_are_the_cpus,
+    light_field::commands_render_them,
+    light_field::frames_are_the_cpus,
     paths::every_model_and_emitter_is_the_cpus,
     paths::a_sky_and_its_sun_are_the_cpus,
     paths::layers_and_full_images_are_the_cpus,

@@ -33,7 +33,7 @@ pub(crate) struct Target {
     layers: Layers,
 }
 
-/// All but the glossy layer.
+/// All but the glossy layer; without a light map, also but the diffuse one.
 pub(crate) struct Baseline {
     pub(crate) scene: Arc<GpuScene>,
     gbuffer: GBuffer,
@@ -43,8 +43,8 @@ pub(crate) struct Baseline {
 }
 
 impl Baseline {
-    pub(crate) fn new(gpu: Arc<Gpu>, world: &World, lightmap: &LightMap, supersample: u32) -> Result<Self> {
-        let scene = GpuScene::lit(gpu.clone(), world, Some(lightmap))?;
+    pub(crate) fn new(gpu: Arc<Gpu>, world: &World, lightmap: Option<&LightMap>, supersample: u32) -> Result<Self> {
+        let scene = GpuScene::lit(gpu.clone(), world, lightmap)?;
         let flat = CurvatureMap::flat(world.scene.geometry.positions.len());
         Ok(Self {
             gbuffer: GBuffer::new(&scene, world, &flat)?,
@@ -55,8 +55,8 @@ impl Baseline {
         })
     }
 
-    /// Renders a frame whose glossy layer `fill` puts into its target, with the camera at the view's size. The view has its glossy
-    /// albedos where `wants_albedo`.
+    /// Renders a frame whose glossy layer `fill` puts into its target, with the camera at the view's size; it may put a diffuse layer in
+    /// place of the view's. The view has its glossy albedos where `wants_albedo`.
     pub(crate) fn frame(
         &mut self,
         camera: &Camera,

@@ -8,9 +8,10 @@ use crate::material::bsdf::{Distribution, Lobes, albedo, microfacet, principled,
 use crate::material::surface;
 use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gpu_gather};
 use crate::method::glossy_probes::{coverage, filter, footprint, perturb, previous, search};
+use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
 use crate::method::path_trace::denoise;
 use crate::method::{image_space_gather, ulr};
-use crate::probe::parameter_map as qhmap;
+use crate::probe::{neighbors, parameter_map as qhmap};
 use crate::transport::{bvh, light_tree, path, sampler};
 use crate::view::{mirror, mirror_light};
 use std::f32::consts;
@@ -97,6 +98,34 @@ fn twins(file: &str) -> Twins {
         "image_space_gather/gather_image.wgsl" => twins! {
             LOBE_SIGMA = image_space_gather::LOBE_SIGMA;
             REACH = image_space_gather::REACH;
+        },
+        "light_field_probes/lit_diffuse.wgsl" => twins! {
+            LEAST_FACING = ambient::LEAST_FACING;
+            LEAST_SEEN = ambient::LEAST_SEEN;
+            AMBIENT_WORDS = gpu_light_field::field::AMBIENT_WORDS;
+        },
+        "light_field_probes/lobe_rays.wgsl" => twins! { LOBE_BRANCH = shade::BRANCHES[2]; },
+        "light_field_probes/march.wgsl" => twins! {
+            COARSE = march::COARSE;
+            SECOND_TOP = march::SECOND_TOP;
+            LEAST_COS = probe::LEAST_COS;
+            TWO_SCALE = march::Search::TwoScale as u32;
+            HI_Z = march::Search::HiZ as u32;
+        },
+        "light_field_probes/params.wgsl" => twins! {
+            DIFFUSE_LIGHT = gpu_light_field::DIFFUSE_LIGHT;
+            GLOSSY_LIGHT = gpu_light_field::GLOSSY_LIGHT;
+            RAYS = gpu_light_field::RAYS;
+        },
+        "light_field_probes/places.wgsl" => twins! {
+            NO_PROBE = octree::NO_PROBE;
+            LEAF = octree::LEAF;
+            LEAST_NEAR = ambient::LEAST_NEAR;
+            COUNT = neighbors::COUNT;
+        },
+        "light_field_probes/trace_rays.wgsl" => twins! {
+            MOST_PROBES = trace::MOST_PROBES;
+            LEAST_LIGHT = probe::LEAST_LIGHT;
         },
         "path_trace/add_guides.wgsl" => twins! { ENVIRONMENT_DEPTH = denoise::FAR; },
         "path_trace/denoise.wgsl" => twins! { MIN_ALBEDO = denoise::MIN_ALBEDO; },

@@ -5,6 +5,7 @@ use crate::gpu::view::{composite, gbuffer, mirror, mirror_light};
 use crate::gpu::{follow, rays};
 use crate::method::glossy_probes::gpu::{coverage, fill, filter, footprint, gather};
 use crate::method::image_space_gather::gpu as image_space_gather;
+use crate::method::light_field_probes::gpu as light_field_probes;
 use crate::method::lightmap_rt::gpu as lightmap_rt;
 use crate::method::path_trace::{denoise_gpu as denoise, gpu as path_trace};
 use crate::method::ulr::gpu as ulr;
@@ -30,6 +31,11 @@ pub(crate) const KERNELS: &[&KernelSpec] = &[
     &gbuffer::GBUFFER,
     &gbuffer::VIEW_FACTORS,
     &image_space_gather::GATHER_IMAGE,
+    &light_field_probes::ADD_GLOSSY,
+    &light_field_probes::DIRECT_STARTS,
+    &light_field_probes::LIT_DIFFUSE,
+    &light_field_probes::LOBE_RAYS,
+    &light_field_probes::TRACE_RAYS,
     &lightmap_rt::MEAN_LIGHT,
     &lightmap_rt::VIEW_STARTS,
     &mirror::MIRROR_PASS,

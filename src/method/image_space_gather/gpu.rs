@@ -68,7 +68,7 @@ pub struct ImageSpaceGather {
 impl ImageSpaceGather {
     /// Compiles the passes, for N x N rays a pixel.
     pub fn new(gpu: Arc<Gpu>, world: &World, lightmap: &LightMap, supersample: u32) -> Result<Self> {
-        let baseline = Baseline::new(gpu.clone(), world, lightmap, supersample)?;
+        let baseline = Baseline::new(gpu.clone(), world, Some(lightmap), supersample)?;
         Ok(Self {
             mirror_light: MirrorLight::new(&baseline.scene)?,
             gather_image: Kernel::new(&gpu, &GATHER_IMAGE)?,

@@ -13,11 +13,11 @@ use std::f32::consts::PI;
 /// Exponent of the cosine about a direction by which distances are averaged. *Ours*: the lobe is some 20 degrees wide.
 const SHARPNESS: f32 = 50.0;
 /// Weight of a probe that the surface faces away from. *Paper*: small, so that no point is without any.
-const LEAST_FACING: f32 = 0.05;
+pub(crate) const LEAST_FACING: f32 = 0.05;
 /// Weight of a probe that is likely hidden.
-const LEAST_SEEN: f32 = 1e-6;
+pub(crate) const LEAST_SEEN: f32 = 1e-6;
 /// Least weight by place of a probe that the octree says sees the point: more than that of hidden ones, less than that of any beside it.
-const LEAST_NEAR: f32 = 1e-3;
+pub(crate) const LEAST_NEAR: f32 = 1e-3;
 /// Texels of the map that light is gathered from, along an edge.
 const COARSE: usize = 64;
 

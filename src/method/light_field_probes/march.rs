@@ -23,9 +23,9 @@ pub enum Search {
 }
 
 /// Level of the coarse squares of [`Search::TwoScale`].
-const COARSE: usize = 4;
+pub(crate) const COARSE: usize = 4;
 /// Coarsest level of [`Search::HiZ`]: squares that hold a quarter of an edge hold near and far.
-const SECOND_TOP: usize = 2;
+pub(crate) const SECOND_TOP: usize = 2;
 
 /// What becomes of a ray, by what one probe knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,7 +146,7 @@ impl Map {
         for _ in 0..most {
             let (square, exit) = leave(line, share, level, n);
             let t = [line.t_at(share), line.t_at(exit)];
-            if ray.farthest(t) >= self.pyramid.at(level, square[0], square[1])[0] {
+            if ray.farthest(t) >= self.pyramid.at(level, square[0], square[1]) {
                 if level > 0 {
                     level = if search == Search::TwoScale { 0 } else { level - 1 };
                     continue;

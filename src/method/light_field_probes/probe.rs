@@ -39,8 +39,11 @@ pub struct Surfels {
     pub normal: Vec<u32>,
 }
 
+/// Texels along an edge of the coarsest level of radiance.
+pub(crate) const LEAST_LIGHT: usize = 4;
+
 /// Least cosine at which a plane is taken as it lies: flatter ones, seen edge on, count as facing the probe.
-const LEAST_COS: f32 = 0.02;
+pub(crate) const LEAST_COS: f32 = 0.02;
 
 impl Surfels {
     /// The direction of a place, in texels.
@@ -110,7 +113,7 @@ impl Light {
         let half_floats = |colors: &[Rgb]| colors.iter().map(|c| c.to_array().map(f16::from_f32)).collect();
         let mut levels = vec![half_floats(&finer)];
         let mut n = size;
-        while n > 4 {
+        while n > LEAST_LIGHT {
             let half = n / 2;
             let merged = |i: usize| {
                 let (x, y) = (2 * (i % half), 2 * (i / half));

@@ -1,17 +1,20 @@
 //! Light field probes in the table of methods.
 
+use super::gpu::LightFieldOnGpu;
 use super::shade::Shading;
 use super::store::LightField;
 use super::{LightFieldParams, march::Search};
 use crate::base::clock::Clock;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
+use crate::gpu::Gpu;
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Samples, Setup, as_given};
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
 use crate::{Error, Result};
 use serde_json::Value;
+use std::sync::Arc;
 
 /// The row.
 pub const METHOD: Method = Method {
@@ -27,7 +30,7 @@ pub const METHOD: Method = Method {
     parameters,
     for_scene: as_given,
     cpu,
-    gpu: None,
+    gpu: Some(gpu),
 };
 
 fn parameters(options: &Options) -> Result<Value> {
@@ -60,9 +63,7 @@ fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let params: LightFieldParams = setup.parameters()?;
     let field = LightField::load(&setup.required_probes()?, &setup.world.scene)?;
     let baseline = Baseline::new(setup.world, None, params.supersample);
-    let (low, high) = setup.world.scene.geometry.bounds();
-    let far = 2.0 * low.distance(high).max(f32::MIN_POSITIVE);
-    Ok(Box::new(OnCpu { world: setup.world, baseline, field, params, seed: setup.seed, far }))
+    Ok(Box::new(OnCpu { world: setup.world, baseline, field, params, seed: setup.seed, far: Shading::far(setup.world) }))
 }
 
 impl Renderer for OnCpu<'_> {
@@ -83,5 +84,33 @@ impl Renderer for OnCpu<'_> {
 
     fn probe_bytes(&self) -> [u64; 2] {
         [self.field.bytes() as u64, 0]
+    }
+}
+
+struct OnGpu {
+    probes: LightFieldOnGpu,
+    seed: u32,
+}
+
+fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let field = LightField::load(&setup.required_probes()?, &setup.world.scene)?;
+    let probes = LightFieldOnGpu::new(gpu, setup.world, &field, &setup.parameters()?)?;
+    Ok(Box::new(OnGpu { probes, seed: setup.seed }))
+}
+
+impl Renderer for OnGpu {
+    fn frame(&mut self, view: &View, _: Option<&View>, samples: u32, progress: &dyn Progress) -> Result<Frame> {
+        let frame = self.probes.frame(&view.camera, samples, self.seed, view.frame)?;
+        progress.advance(view.camera.size[1].into());
+        Ok(Frame::of(frame.layers, frame.passes))
+    }
+
+    /// Its passes are as long as their pace says, so that the host times them.
+    fn gpu(&self) -> Option<(&str, bool)> {
+        Some((self.probes.device(), false))
+    }
+
+    fn probe_bytes(&self) -> [u64; 2] {
+        [0, self.probes.probe_bytes()]
     }
 }

@@ -27,10 +27,19 @@ pub struct Shading<'a> {
     pub far: f32,
 }
 
+/// Branches of a pixel's random stream: direct light of either layer, and rays along the glossy lobes.
+pub(crate) const BRANCHES: [u32; 3] = [1, 2, 3];
+
 /// Direct light alone.
-const DIRECT: PathParams = PathParams { max_depth: 1, rr_depth: u32::MAX };
+pub(crate) const DIRECT: PathParams = PathParams { max_depth: 1, rr_depth: u32::MAX };
 
 impl Shading<'_> {
+    /// The length of rays in a scene.
+    pub fn far(world: &World) -> f32 {
+        let (low, high) = world.scene.geometry.bounds();
+        2.0 * low.distance(high).max(f32::MIN_POSITIVE)
+    }
+
     /// The diffuse layer, linear radiance.
     pub fn diffuse(&self, view: &GBuffer) -> Vec<Rgb> {
         self.layer(view, |p, stream| {
@@ -42,7 +51,7 @@ impl Shading<'_> {
             }
             let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
             let around = self.field.irradiance(surface.p, p.normal);
-            self.direct(p, query, stream, 1) + albedo * around * FRAC_1_PI
+            self.direct(p, query, stream, BRANCHES[0]) + albedo * around * FRAC_1_PI
         })
     }
 
@@ -52,11 +61,11 @@ impl Shading<'_> {
             if p.alpha.is_none() {
                 return Rgb::ZERO;
             }
-            let sampler = |s| Sampler::new(hash_words(&[stream, 3]), s);
+            let sampler = |s| Sampler::new(hash_words(&[stream, BRANCHES[2]]), s);
             let rays = (0..self.params.samples)
                 .map(|s| along_lobe((self.world, self.field), (&p.surface, p.wo), (&self.params, self.far), &mut sampler(s)));
             let sum: Rgb = rays.filter(|c| c.is_finite()).sum();
-            self.direct(p, GLOSSY, stream, 2) + sum / self.params.samples as f32
+            self.direct(p, GLOSSY, stream, BRANCHES[1]) + sum / self.params.samples as f32
         })
     }
 

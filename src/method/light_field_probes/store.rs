@@ -6,7 +6,7 @@ use super::ambient::irradiance;
 use super::bake::{LightFieldBakeParams, Seen};
 use super::march::Map;
 use super::octree::Octree;
-use super::probe::{Ambient, Light, Surfels};
+use super::probe::{Ambient, LEAST_LIGHT, Light, Surfels};
 use crate::base::math::Rgb;
 use crate::io::{ExrImage, Provenance, json};
 use crate::probe::octahedral::pack;
@@ -16,6 +16,7 @@ use crate::probe::store::read_set;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
+use half::f16;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -52,6 +53,15 @@ impl LightFieldSet {
         }
         Ok(set)
     }
+}
+
+/// Memory that a probe takes, bytes: surfaces, bounds of their distances and radiance with their levels, and ambient light.
+pub fn probe_bytes(bake: &LightFieldBakeParams) -> usize {
+    let [texels, ambient] = [bake.size, bake.ambient_size].map(|n| (n * n) as usize);
+    // A level has a quarter of the texels of the one before, down to 1 or to LEAST_LIGHT along an edge.
+    let levels = |least: usize| (4 * texels - least * least) / 3;
+    let surfaces = texels * size_of::<(f32, u32)>() + levels(1) * size_of::<f32>();
+    surfaces + levels(LEAST_LIGHT) * size_of::<[f16; 3]>() + ambient * size_of::<(Rgb, Vec2)>()
 }
 
 /// Light field probes in memory, by their index; blocked ones hold nothing.

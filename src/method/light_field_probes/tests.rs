@@ -4,7 +4,7 @@ use super::bake::{LightFieldBakeParams, Seen, bounce, look};
 use super::march::{LocalRay, Map, March, Search};
 use super::octree::NO_PROBE;
 use super::probe::Light;
-use super::store::LightField;
+use super::store::{LightField, probe_bytes};
 use super::trace::{Found, trace};
 use crate::base::math::{Rgb, hash_words, unit};
 use crate::base::ray::Ray;
@@ -186,6 +186,7 @@ fn bounces_add_up_in_a_furnace() {
     let params = LightFieldBakeParams { size: 64, ambient_size: 16, spp: 64, lobe_samples: 1, bounces: 6 };
     let field = field(&world, [2, 2, 2], 1.5, &params);
     // Scattered radiance is albedo (1 + albedo + ...), here to the sixth bounce.
+    assert_eq!(field.bytes(), 8 * probe_bytes(&params));
     let expected = (1..=6).map(|k| 0.5f32.powi(k)).sum::<f32>();
     for i in 0..50 {
         let n = direction(i);

@@ -11,7 +11,7 @@ use crate::base::ray::Ray;
 use glam::Vec3;
 
 /// Probes that a ray may be followed by.
-const MOST_PROBES: usize = 32;
+pub(crate) const MOST_PROBES: usize = 32;
 /// Stands for no probe.
 const NONE: usize = usize::MAX;
 

@@ -65,7 +65,7 @@ pub struct LightmapRt {
 impl LightmapRt {
     /// Compiles the passes. Of `params` all count but the samples.
     pub fn new(gpu: Arc<Gpu>, world: &World, lightmap: &LightMap, params: &LightmapRtParams) -> Result<Self> {
-        let baseline = Baseline::new(gpu.clone(), world, lightmap, params.supersample)?;
+        let baseline = Baseline::new(gpu.clone(), world, Some(lightmap), params.supersample)?;
         let purpose = if params.next_event { Purpose::Scattering(GLOSSY) } else { Purpose::Rays(GLOSSY) };
         let place = Place { branch: None, first_set: 0 };
         Ok(Self {

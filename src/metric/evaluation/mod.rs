@@ -127,7 +127,7 @@ pub struct MethodCost {
 /// A set of probes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ProbeCost {
-    /// Probes of the grid that are not blocked.
+    /// Probes that are not blocked.
     pub count: usize,
     /// Those that were baked: all, or those that the views use.
     pub baked: usize,

@@ -6,6 +6,7 @@ use crate::Result;
 use crate::base::clock::seconds;
 use crate::io::json;
 use crate::method::glossy_probes::wanted::Served;
+use crate::method::light_field_probes::store::{LightFieldSet, probe_bytes};
 use crate::metric::evaluation::{Costs, MethodCost, ProbeCost, StageCost};
 use crate::plan::timings::{Timings, frame_ms, is_rendering};
 use crate::plan::{Context, pipeline};
@@ -65,6 +66,17 @@ fn method_cost(frames: &Path, probes: Option<&Path>, name: &str, costs: &Costs, 
 
 /// What a set of probes holds; `None` for a folder of something else.
 fn probe_cost(folder: &Path, scene: &Scene) -> Option<ProbeCost> {
+    light_field_cost(folder).or_else(|| glossy_cost(folder, scene))
+}
+
+fn light_field_cost(folder: &Path) -> Option<ProbeCost> {
+    let set = LightFieldSet::read(folder).ok()?;
+    let baked = set.files.iter().filter(|files| files.iter().all(|hash| !hash.is_empty())).count();
+    let bytes = (baked * probe_bytes(&set.bake)) as u64;
+    Some(ProbeCost { count: set.places.used().len(), baked, size: [set.bake.size; 2], bytes })
+}
+
+fn glossy_cost(folder: &Path, scene: &Scene) -> Option<ProbeCost> {
     let mut store = ProbeStore::<Served>::open(folder, scene, 8).ok()?;
     let baked: Vec<usize> = (0..store.set.files.len()).filter(|&i| !store.set.files[i].is_empty()).collect();
     let one = store.probe(*baked.first()?).ok()?.bytes();
