@@ -7,7 +7,7 @@ use super::placement::ProbeWeight;
 use glam::Vec3;
 
 /// Probes that take part.
-const COUNT: usize = 8;
+pub(crate) const COUNT: usize = 8;
 
 /// The eight probes of `positions` nearest to `p`, the nearest first; weights sum to 1. Of fewer than eight the rest have weight 0.
 pub fn around(positions: &[[f32; 3]], p: Vec3) -> [ProbeWeight; COUNT] {

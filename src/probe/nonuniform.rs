@@ -142,11 +142,12 @@ pub fn place(
         candidates.extend(widest(space));
     }
     progress.advance(1);
-    let enough = Enough {
-        count: params.count.map(|n| n as usize),
-        coverage: params.coverage.unwrap_or(COVERAGE),
-        most: PROBES_MAX,
-        fill: params.coverage.is_none() && params.count.is_some(),
+    let enough = match (params.count, params.coverage) {
+        (Some(count), None) => Enough::Count { count: count as usize, near: space.spacing(count) },
+        (count, share) => {
+            let most = count.map_or(PROBES_MAX, |n| n as usize);
+            Enough::Coverage { share: share.unwrap_or(COVERAGE), most }
+        }
     };
     let chosen = choose(world, sides, candidates, &enough);
     progress.finish();

@@ -176,11 +176,39 @@ fn the_greedy_choice_takes_what_sees_most_first() {
     let reachable = reachable(&world, ROOM, CAMERA, &params(Placement::Sdf)).unwrap();
     let candidates = vec![Vec3::new(1.7, -0.9, 0.0), Vec3::new(-0.5, 0.7, 0.0), Vec3::new(0.0, 0.5, 0.3)];
     let shares: Vec<f64> = candidates.iter().map(|&p| reachable.sides.share(&reachable.sides.row(&world, p))).collect();
-    let enough = Enough { count: Some(3), coverage: 1.0, most: 100, fill: true };
-    let chosen = choose(&world, &reachable.sides, candidates.clone(), &enough);
+    let chosen = choose(&world, &reachable.sides, candidates.clone(), &Enough::Coverage { share: 0.999, most: 3 });
     let most = (0..3).max_by(|&a, &b| shares[a].total_cmp(&shares[b])).unwrap();
     assert_eq!(chosen.positions[0], candidates[most]);
     assert_eq!(chosen.positions.len(), 3);
+}
+
+/// Of a number of probes, none stands in a nook that sees a little more while another place sees all of the rest better; and the choice, which asks
+/// few candidates again, is that of asking all of them.
+#[test]
+fn a_count_of_probes_is_chosen_by_how_well_they_see() {
+    let world = room();
+    let reachable = reachable(&world, ROOM, CAMERA, &params(Placement::Sdf)).unwrap();
+    let (sides, near) = (&reachable.sides, reachable.space.spacing(4));
+    let random = |i: u32, k: u32| crate::base::math::unit(crate::base::math::hash_words(&[i, k]));
+    let candidates: Vec<Vec3> = (0..100)
+        .map(|i| ROOM.0 + (ROOM.1 - ROOM.0) * Vec3::new(random(i, 0), random(i, 1), random(i, 2)))
+        .filter(|&p| reachable.space.has(&world, p))
+        .collect();
+    let chosen = choose(&world, sides, candidates.clone(), &Enough::Count { count: 4, near });
+    let seen_by = |probes: &[Vec3]| -> f64 {
+        let best = |side: &super::coverage::Side| {
+            let well = |&p: &Vec3| side.seen_from(&world, p).map_or(0.0, |(cos, d)| cos / (1.0 + d * d / (near * near)));
+            f64::from(side.area) * f64::from(probes.iter().map(well).fold(0.0, f32::max))
+        };
+        sides.list.iter().map(best).sum()
+    };
+    let mut probes: Vec<Vec3> = Vec::new();
+    for _ in 0..4 {
+        let with = |p: &Vec3| seen_by(&[&probes[..], &[*p]].concat());
+        let next = candidates.iter().map(|p| (with(p), *p)).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        probes.push(next.1);
+    }
+    assert!(seen_by(&chosen.positions) > 0.995 * seen_by(&probes), "{:?} not {probes:?}", chosen.positions);
 }
 
 fn refined(world: &World, reachable: &Reachable, start: &[Vec3], passes: u32, seed: u32) -> Refined {

@@ -1,31 +1,41 @@
 //! Which of many candidates become probes ([Wang et al. 2019] §3: "the fewest number of probes needed").
 //!
-//! *Ours*: the paper puts a probe at every candidate, and has their density set by hand. Here a greedy choice takes the candidate that
-//! sees the most of what no probe before it saw, until enough is seen, or there are enough probes. Once enough is seen, what has been seen
-//! once counts next, then what has been seen twice: each place should be seen from many sides. Where candidates are left that see nothing
-//! new, further ones come from the free space before the sides that are still unseen, so that full coverage is always in reach.
+//! *Ours*: the paper puts a probe at every candidate, and has their density set by hand. Here a greedy choice adds one probe after the other.
+//! Where coverage is asked for, the next is the candidate that sees the most of what no probe before it saw, until enough is seen; where
+//! candidates are left that see nothing new, further ones come from the free space before the sides that are still unseen, so that full
+//! coverage is always in reach. Where a number of probes is asked for, it is the candidate that most improves how well all sides are seen by
+//! the probe that sees each best (§3.2: not at a slant, and not from far away). Either gain only shrinks as probes are added: the
+//! choice is within 1 - 1/e of the best one (Nemhauser et al. 1978), and gains of earlier rounds bound those of later ones.
 
-use super::coverage::{Row, Sides, bits};
+use super::coverage::{Row, Side, Sides, bits};
 use crate::transport::World;
 use glam::Vec3;
 use rayon::prelude::*;
 
 /// Candidates that are added at a time for sides that no candidate sees.
 const MORE: usize = 128;
+/// Candidates whose gains are found at a time.
+const BATCH: usize = 32;
 /// What counts as nothing, as a share of all sides' area.
 const NOTHING: f64 = 1e-9;
 
 /// When there are enough probes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Enough {
+pub enum Enough {
+    /// This share of the reachable sides is seen, or there are so many probes.
+    Coverage {
+        /// The share.
+        share: f64,
+        /// Most probes.
+        most: usize,
+    },
     /// So many probes.
-    pub count: Option<usize>,
-    /// This share of the reachable sides is seen; with a count, what counts as all.
-    pub coverage: f64,
-    /// Most probes, whatever they see.
-    pub most: usize,
-    /// Whether to go on after `coverage` up to `count`.
-    pub fill: bool,
+    Count {
+        /// Number of probes.
+        count: usize,
+        /// Distance at which a side is seen half as well as from close by, metres.
+        near: f32,
+    },
 }
 
 /// The chosen probes.
@@ -40,54 +50,92 @@ pub struct Chosen {
 }
 
 /// Chooses among `candidates`, none of them twice.
-pub fn choose(world: &World, sides: &Sides, mut candidates: Vec<Vec3>, enough: &Enough) -> Chosen {
+pub fn choose(world: &World, sides: &Sides, candidates: Vec<Vec3>, enough: &Enough) -> Chosen {
+    match *enough {
+        Enough::Coverage { share, most } => until_covered(world, sides, candidates, share, most),
+        Enough::Count { count, near } => best_views(world, sides, candidates, count, near),
+    }
+}
+
+fn until_covered(world: &World, sides: &Sides, mut candidates: Vec<Vec3>, share: f64, most: usize) -> Chosen {
     let mut rows = sides.rows(world, &candidates);
     let mut left: Vec<bool> = vec![true; candidates.len()];
     let mut times = vec![0u32; sides.list.len()];
     let mut chosen = Chosen::default();
-    let mut level = 0;
-    let most = enough.count.unwrap_or(usize::MAX).min(enough.most);
     while chosen.positions.len() < most {
-        let unseen = where_seen(&times, 0);
-        let is_covered = 1.0 - sides.share(&unseen) >= enough.coverage;
-        if is_covered && !enough.fill {
+        let unseen = unseen(&times);
+        if 1.0 - sides.share(&unseen) >= share {
             break;
         }
-        if is_covered {
-            level = level.max(1);
-        }
-        let wanted = if level == 0 { unseen } else { where_seen(&times, level) };
-        if let Some(best) = best(sides, &rows, &left, &wanted) {
+        if let Some(best) = best(sides, &rows, &left, &unseen) {
             left[best] = false;
             bits(rows[best].iter().copied()).for_each(|i| times[i] += 1);
             chosen.positions.push(candidates[best]);
             chosen.rows.push(rows[best].clone());
-        } else if level == 0 {
+        } else {
             // A side's witness sees at least that side: each round gets on, or ends.
-            let more = witnesses(sides, &wanted);
+            let more = witnesses(sides, &unseen);
             let new = sides.rows(world, &more);
-            if more.is_empty() || new.iter().all(|row| sides.area_of(common(row, &wanted)) <= NOTHING * sides.area) {
-                level = 1;
-                if !enough.fill {
-                    break;
-                }
+            if more.is_empty() || new.iter().all(|row| sides.area_of(common(row, &unseen)) <= NOTHING * sides.area) {
+                break;
             }
             left.extend(more.iter().map(|_| true));
             candidates.extend(more);
             rows.extend(new);
-        } else if left.contains(&true) {
-            level += 1;
-        } else {
-            break;
         }
     }
     chosen.candidates = candidates.len();
     chosen
 }
 
-/// Sides that at most `times_most` probes see.
-fn where_seen(times: &[u32], times_most: u32) -> Row {
-    let word = |chunk: &[u32]| chunk.iter().enumerate().map(|(k, &n)| u64::from(n <= times_most) << k).sum();
+fn best_views(world: &World, sides: &Sides, candidates: Vec<Vec3>, count: usize, near: f32) -> Chosen {
+    let rows = sides.rows(world, &candidates);
+    let mut seen = vec![0f32; sides.list.len()];
+    let mut chosen = Chosen { candidates: candidates.len(), ..Chosen::default() };
+    // Gains as they were last known, which is no less than what they are.
+    let mut order: Vec<(f64, usize)> = (0..candidates.len()).map(|i| (f64::INFINITY, i)).collect();
+    while chosen.positions.len() < count && !order.is_empty() {
+        let mut best = f64::NEG_INFINITY;
+        for at in (0..order.len()).step_by(BATCH) {
+            if order[at].0 < best {
+                break;
+            }
+            let end = (at + BATCH).min(order.len());
+            let gain = |&(_, i): &(f64, usize)| (gain(sides, &rows[i], candidates[i], &seen, near), i);
+            let known: Vec<_> = order[at..end].par_iter().map(gain).collect();
+            best = known.iter().fold(best, |best, (gain, _)| best.max(*gain));
+            order[at..end].copy_from_slice(&known);
+        }
+        order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let (_, i) = order.remove(0);
+        for side in bits(rows[i].iter().copied()) {
+            seen[side] = seen[side].max(view(&sides.list[side], candidates[i], near));
+        }
+        chosen.positions.push(candidates[i]);
+        chosen.rows.push(rows[i].clone());
+    }
+    chosen
+}
+
+/// What a probe would add to how well all sides are seen, m².
+fn gain(sides: &Sides, row: &Row, probe: Vec3, seen: &[f32], near: f32) -> f64 {
+    let more = |i: usize| {
+        let side = &sides.list[i];
+        f64::from(side.area * (view(side, probe, near) - seen[i]).max(0.0))
+    };
+    bits(row.iter().copied()).map(more).sum()
+}
+
+/// How well a probe sees a side, at most 1: about as the side's share of the probe's texels goes, until it fills enough of them.
+fn view(side: &Side, probe: Vec3, near: f32) -> f32 {
+    let way = probe - side.p;
+    let squared = way.length_squared().max(f32::MIN_POSITIVE);
+    (side.n.dot(way) / squared.sqrt()).max(0.0) / (1.0 + squared / (near * near))
+}
+
+/// Sides that no probe sees.
+fn unseen(times: &[u32]) -> Row {
+    let word = |chunk: &[u32]| chunk.iter().enumerate().map(|(k, &n)| u64::from(n == 0) << k).sum();
     times.chunks(64).map(word).collect()
 }
 

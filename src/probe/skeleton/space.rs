@@ -81,6 +81,12 @@ impl Space {
             && voxels.corners(p).into_iter().any(|c| self.free[voxels.index(c)] && clear(world, voxels.centre_at(c), p))
     }
 
+    /// Edge of the cube that each of `count` probes has for itself, metres.
+    pub fn spacing(&self, count: u32) -> f32 {
+        let volume = self.free.iter().filter(|free| **free).count() as f32 * self.field.voxels.edge.powi(3);
+        (volume / count.max(1) as f32).cbrt()
+    }
+
     /// Whether the voxel of `p` is free and no surface crosses it, so that all of it is free.
     pub fn is_open(&self, p: Vec3) -> bool {
         let voxels = &self.field.voxels;
