@@ -8,6 +8,7 @@
 
 pub mod ambient;
 pub mod bake;
+pub mod inspect;
 pub mod lobe;
 pub mod march;
 pub mod octree;
