@@ -90,6 +90,15 @@ fn bakes_are_the_same_in_shards_on_one_thread_and_after_damage() {
 }
 
 #[test]
+fn probes_in_no_grid_make_frames() {
+    let f = folder();
+    f.success("place-probes scene.xml --method sdf --count 3 -o probes.json");
+    f.success(&format!("{} -o lightfield", BAKE.replace("128", "32")));
+    f.success(&format!("{RENDER} --probes lightfield --samples 2 -o frames"));
+    assert!(mean(&f, "frames/0000.exr", "glossy")[0] > 0.01);
+}
+
+#[test]
 fn what_does_not_fit_is_refused() {
     let f = folder();
     f.success(PLACE);

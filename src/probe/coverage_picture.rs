@@ -171,7 +171,7 @@ fn legend(canvas: &mut Canvas, [x, mut y]: [usize; 2], coverage: &Coverage, ramp
         y += LINE + 2;
     }
     y += LINE / 2;
-    y += canvas.paragraph([x, y], width, "Share of the reachable area:", INK);
+    y += canvas.paragraph([x, y], width, "Share of the reachable area (texels differ in size):", INK);
     let area: f64 = coverage.sides.list.iter().map(|s| f64::from(s.area)).sum::<f64>().max(f64::MIN_POSITIVE);
     for [low, high] in classes(ramp.most) {
         let high = high.min(ramp.most.max(low));

@@ -38,7 +38,6 @@ pub type Set = [u32; WIDTH];
 
 /// The tree.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Octree {
     /// The corner of its cube at the lowest x, y and z, metres.
     pub lower: [f32; 3],

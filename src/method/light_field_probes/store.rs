@@ -42,15 +42,24 @@ pub fn files(folder: &Path, index: usize) -> [PathBuf; 3] {
     ["", "_light", "_ambient"].map(|ending| folder.join(format!("{index:04}{ending}.exr")))
 }
 
+/// What every `set.json` says.
+#[derive(Deserialize)]
+struct Source {
+    provenance: Provenance,
+}
+
 impl LightFieldSet {
+    /// The subcommand that writes it.
+    const STAGE: &str = "bake-lightfield";
+
     /// Reads `set.json`.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = ProbeSet::path(folder);
-        let set: Self = json::parse(&path, &read_set(folder, "bake-lightfield")?)?;
-        if set.provenance.stage != "bake-lightfield" || set.files.len() != set.places.len() {
-            return Err(Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"));
-        }
-        Ok(set)
+        let text = read_set(folder, Self::STAGE)?;
+        let is_ours = json::parse::<Source>(&path, &text)?.provenance.stage == Self::STAGE;
+        let set = if is_ours { Some(json::parse::<Self>(&path, &text)?) } else { None };
+        set.filter(|set| set.files.len() == set.places.len())
+            .ok_or_else(|| Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"))
     }
 
     /// The [`files`] of a probe that is not blocked.
