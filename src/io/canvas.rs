@@ -73,8 +73,11 @@ impl Canvas {
 
     /// A straight line, `width` pixels wide.
     pub fn line(&mut self, ends: [Vec2; 2], width: u32, colour: Colour) {
-        // Beyond that, every pixel on the way would be asked for.
-        let [a, b] = ends.map(|p| p.clamp(Vec2::splat(-4096.0), Vec2::splat(16384.0)).floor());
+        // The library's integers hold no more than a canvas, and it asks for every pixel on the way.
+        let margin = Vec2::splat(2.0 * width as f32);
+        let size = Vec2::new(self.size[0] as f32, self.size[1] as f32);
+        let Some([a, b]) = clipped(ends, -margin, size + margin) else { return };
+        let [a, b] = [a.floor(), b.floor()];
         let point = |p: Vec2| Point::new(p.x as i32, p.y as i32);
         let style = PrimitiveStyle::with_stroke(rgb(colour), width);
         let Ok(()) = Line::new(point(a), point(b)).into_styled(style).draw(self);
@@ -140,6 +143,23 @@ impl Canvas {
     }
 }
 
+/// What of a straight line lies in a box.
+fn clipped([a, b]: [Vec2; 2], lower: Vec2, upper: Vec2) -> Option<[Vec2; 2]> {
+    let along = b - a;
+    let (mut from, mut to) = (0.0f32, 1.0f32);
+    for axis in 0..2 {
+        if along[axis] == 0.0 {
+            if !(lower[axis]..=upper[axis]).contains(&a[axis]) {
+                return None;
+            }
+            continue;
+        }
+        let [s, t] = [lower, upper].map(|end| (end[axis] - a[axis]) / along[axis]);
+        (from, to) = (from.max(s.min(t)), to.min(s.max(t)));
+    }
+    (from <= to).then(|| [a + along * from, a + along * to])
+}
+
 /// Words in lines of at most `most` letters; a word that is longer stands alone.
 fn wrapped(words: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
@@ -190,6 +210,11 @@ mod tests {
         let red = [255, 0, 0];
         canvas.line([Vec2::new(2.0, 5.0), Vec2::new(1e9, 5.0)], 1, red);
         assert!((2..40).all(|x| canvas.pixels[5 * 40 + x] == red) && canvas.pixels[5 * 40 + 1] == BACKGROUND);
+        let before = canvas.clone();
+        for ends in [[Vec2::new(-9.0, 99.0), Vec2::new(1e9, 99.0)], [Vec2::new(-50.0, 10.0), Vec2::new(10.0, -50.0)]] {
+            canvas.line(ends, 3, red);
+        }
+        assert_eq!(canvas, before);
         canvas.dot(Vec2::new(10.5, 20.5), 3.0, red);
         assert_eq!(
             (canvas.pixels[20 * 40 + 10], canvas.pixels[20 * 40 + 14], canvas.pixels[20 * 40 + 17]),
