@@ -114,6 +114,17 @@ fn bakes_are_the_same_in_shards_on_one_thread_and_after_damage() {
 }
 
 #[test]
+fn probes_in_no_grid_make_frames() {
+    let f = folder();
+    f.success("place-probes scene.xml --method sdf --count 3 -o probes.json");
+    f.success(&format!("{} -o lightfield", BAKE.replace("128", "32")));
+    f.success(&format!("{RENDER} --probes lightfield --samples 2 -o frames"));
+    f.success("render-path scene.xml --path path.json --method path-trace --spp 64 --device cpu -o reference");
+    let [ours, theirs] = ["frames", "reference"].map(|folder| mean(&f, &format!("{folder}/0000.exr"), "glossy")[0]);
+    assert!((ours - theirs).abs() < 0.15 * theirs, "{ours}, path tracing {theirs}");
+}
+
+#[test]
 fn what_does_not_fit_is_refused() {
     let f = folder();
     f.success(PLACE);

@@ -1,6 +1,7 @@
-//! Files: EXR layers, JSON, atomic writes, provenance, checksums.
+//! Files: EXR layers, JSON, pictures and diagrams, atomic writes, provenance, checksums.
 
 pub mod atomic;
+pub mod canvas;
 pub mod exr;
 pub mod jobs;
 pub mod json;

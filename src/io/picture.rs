@@ -39,11 +39,16 @@ pub fn check_png(path: &Path) -> Result<()> {
         return Err(Error::input(path, "expected a name that ends in .png"));
     }
     match std::fs::read(path) {
-        Ok(bytes) if !bytes.get(PNG_HEAD + 4..).is_some_and(|rest| rest.starts_with(OURS)) => {
+        Ok(bytes) if !is_ours(&bytes) => {
             Err(Error::input(path, "was not written by reprobe: remove it, or give the picture another name"))
         }
         _ => Ok(()),
     }
+}
+
+/// Whether a file that begins like this was written by [`write_png`].
+pub fn is_ours(start: &[u8]) -> bool {
+    start.get(PNG_HEAD + 4..).is_some_and(|rest| rest.starts_with(OURS))
 }
 
 /// A layer of an image as 8-bit RGB.
@@ -155,7 +160,8 @@ fn vector(triple: &[Vec<f32>; 3]) -> (String, Vec<[u8; 3]>) {
     )
 }
 
-fn scalar(values: &[f32]) -> (String, Vec<[u8; 3]>) {
+/// Finite values from dark to bright, and what the colours mean.
+pub fn scalar(values: &[f32]) -> (String, Vec<[u8; 3]>) {
     let (lo, hi) = range(values);
     let rgb = values.iter().map(|&v| if v.is_finite() { heat((v - lo) / (hi - lo).max(1e-20)) } else { [255, 0, 255] }).collect();
     (format!("{lo:.4} (dark) to {hi:.4} (bright); magenta is not finite"), rgb)

@@ -1,6 +1,8 @@
 //! A stage of a pipeline: one of the subcommands that read files and write files.
 
-use super::stages::{BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
+use super::stages::{
+    BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap, RenderPath, Resmap,
+};
 use super::{Context, Outcome, overwrite};
 use crate::Result;
 use crate::io::atomic;
@@ -28,6 +30,8 @@ pub enum Stage {
     RenderPath(RenderPath),
     /// `compare`
     Compare(Compare),
+    /// `inspect-lightfield`
+    InspectLightfield(InspectLightfield),
 }
 
 /// The stages that bake, in the order in which they run.
@@ -54,6 +58,7 @@ macro_rules! with {
             Stage::BakeLightfield($s) => $what,
             Stage::RenderPath($s) => $what,
             Stage::Compare($s) => $what,
+            Stage::InspectLightfield($s) => $what,
         }
     };
 }
@@ -65,7 +70,7 @@ macro_rules! from {
         }
     })+ };
 }
-from!(PlaceProbes, Resmap, Qhmap, Curvature, BakeLightmap, BakeProbes, BakeLightfield, RenderPath, Compare);
+from!(PlaceProbes, Resmap, Qhmap, Curvature, BakeLightmap, BakeProbes, BakeLightfield, RenderPath, Compare, InspectLightfield);
 
 impl Stage {
     /// The subcommand.
@@ -83,6 +88,7 @@ impl Stage {
             Self::BakeLightfield(s) => of(s, BakeLightfield::COMMAND),
             Self::RenderPath(s) => of(s, RenderPath::COMMAND),
             Self::Compare(s) => of(s, Compare::COMMAND),
+            Self::InspectLightfield(s) => of(s, InspectLightfield::COMMAND),
         }
     }
 
@@ -107,6 +113,7 @@ impl Stage {
             Self::PlaceProbes(_) | Self::Curvature(_) | Self::BakeLightmap(_) => vec![],
             Self::Resmap(s) => vec![&s.probes],
             Self::BakeLightfield(s) => vec![&s.probes],
+            Self::InspectLightfield(s) => vec![&s.probes],
             Self::Qhmap(s) => vec![&s.resmap],
             Self::BakeProbes(s) => [&s.probes, &s.qhmap].into_iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::RenderPath(s) => s.probes.iter().chain(&s.lightmap).chain(&s.curvature).collect(),
@@ -124,6 +131,7 @@ impl Stage {
             Self::BakeLightfield(s) => vec![&s.scene],
             Self::BakeProbes(s) => [&s.scene].into_iter().chain(&s.for_path).collect(),
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
+            Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),
             Self::Qhmap(_) => vec![],
             Self::Compare(s) => s.second_reference.iter().collect(),
         }

@@ -27,6 +27,9 @@ const DIRECTIONS: u32 = 48;
 /// How much of its length a ray leaves out before the probe.
 const GAP: f32 = 1e-4;
 
+/// What no probe sees, in pictures: a colour that [`heat`](crate::io::picture::heat) comes nowhere near.
+pub const UNSEEN: [u8; 3] = [230, 0, 200];
+
 /// One side of a texel of the atlas.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Side {
@@ -36,6 +39,8 @@ pub struct Side {
     pub n: Vec3,
     /// Area, m².
     pub area: f32,
+    /// Which of [`Sides::surface`] it is a side of.
+    pub texel: u32,
     /// How far along `n` rays start, metres.
     offset: f32,
     /// A point of the free space that sees it.
@@ -49,6 +54,10 @@ pub struct Sides {
     pub list: Vec<Side>,
     /// Points on all surfaces and their normals, seen or not.
     pub surface: Vec<(Vec3, Vec3)>,
+    /// Pixel of the atlas (row · width + column) of each of these.
+    pub pixel: Vec<u32>,
+    /// Width and height of the atlas, pixels.
+    pub atlas: [u32; 2],
     /// Area of all sides together, m².
     pub area: f64,
 }
@@ -74,19 +83,21 @@ impl Sides {
     /// About `texels` texels of the opaque surfaces in the box `within` (lower and upper corner), and those of their sides that the free
     /// space sees.
     pub fn new(world: &World, space: &Space, within: (Vec3, Vec3), texels: u32) -> Result<Self> {
-        let points = surface_points(world, within, texels)?;
+        let (points, atlas) = surface_points(world, within, texels)?;
         let free: Vec<usize> = (0..space.free.len()).filter(|&i| space.is_open(space.field.voxels.centre(i))).collect();
         let targets: Vec<Vec3> = (0..TARGETS.min(free.len()))
             .map(|k| space.field.voxels.centre(free[(2 * k + 1) * free.len() / (2 * TARGETS)]))
             .collect();
-        let sides_of = |(surface, area): &(Surface, f32)| {
-            let side = |n| Side { p: surface.p, n, area: *area, offset: surface.offset, witness: Vec3::ZERO };
+        let sides_of = |(i, SurfacePoint { surface, area, .. }): (usize, &SurfacePoint)| {
+            let side = |n| Side { p: surface.p, n, area: *area, texel: i as u32, offset: surface.offset, witness: Vec3::ZERO };
             let seen = |side: Side| Some(Side { witness: witness(world, space, &side, &targets)?, ..side });
             [surface.ng, -surface.ng].map(|n| seen(side(n)))
         };
-        let list: Vec<Side> = points.par_iter().map(sides_of).collect::<Vec<_>>().into_iter().flatten().flatten().collect();
+        let list: Vec<Side> =
+            points.par_iter().enumerate().map(sides_of).collect::<Vec<_>>().into_iter().flatten().flatten().collect();
         let area = list.iter().map(|s| f64::from(s.area)).sum();
-        Ok(Self { list, surface: points.iter().map(|(s, _)| (s.p, s.ng)).collect(), area })
+        let surface = points.iter().map(|p| (p.surface.p, p.surface.ng)).collect();
+        Ok(Self { list, surface, pixel: points.iter().map(|p| p.pixel).collect(), atlas, area })
     }
 
     /// What a probe at `probe` sees.
@@ -145,9 +156,23 @@ pub fn is_opaque(world: &World, triangle: u32) -> bool {
     world.scene.materials.get(material).is_none_or(|m| !m.bsdf.is_transmissive())
 }
 
-/// A point of each texel of a coarse light map of what lies in a box, and the area that the texel covers, m². Where the scene has many more
-/// charts than texels are asked for, points are drawn evenly over their areas.
-fn surface_points(world: &World, (lower, upper): (Vec3, Vec3), texels: u32) -> Result<Vec<(Surface, f32)>> {
+/// How many of the probes, up to `most`, see a surface on the side of its unit normal `n`.
+pub fn seen_by(world: &World, surface: &Surface, n: Vec3, probes: &[Vec3], most: usize) -> usize {
+    let sees = |probe: &&Vec3| n.dot(**probe - surface.p) > 0.0 && !world.occluded(&surface.spawn_to(**probe));
+    probes.iter().filter(sees).take(most).count()
+}
+
+/// A point of a texel of the atlas.
+struct SurfacePoint {
+    surface: Surface,
+    /// Area that the texel covers, m².
+    area: f32,
+    pixel: u32,
+}
+
+/// A point of each texel of a coarse light map of what lies in a box, and the map's size. Where the scene has many more charts than texels
+/// are asked for, points are drawn evenly over their areas.
+fn surface_points(world: &World, (lower, upper): (Vec3, Vec3), texels: u32) -> Result<(Vec<SurfacePoint>, [u32; 2])> {
     let clipped = clip(&world.scene.geometry, &|t| is_opaque(world, t), lower, upper);
     let geometry = &clipped.geometry;
     let keep = |object: usize| !geometry.objects[object].triangles.is_empty();
@@ -161,12 +186,13 @@ fn surface_points(world: &World, (lower, upper): (Vec3, Vec3), texels: u32) -> R
         let ([a, b, c], [u, v]) = (geometry.corners(point.triangle), point.barycentric.to_array());
         let triangle = clipped.source[point.triangle as usize];
         let b = barycentric(&world.scene.geometry.corners(triangle), a * (1.0 - u - v) + b * u + c * v);
-        (world.surface(&Hit { t: 0.0, triangle, u: b.x, v: b.y }), area)
+        SurfacePoint { surface: world.surface(&Hit { t: 0.0, triangle, u: b.x, v: b.y }), area, pixel: all.pixel[i] }
     };
     let chosen: Vec<(usize, f32)> =
         if all.len() > 2 * texels as usize { drawn(&areas, texels) } else { areas.into_iter().enumerate().collect() };
-    let surfaces = chosen.into_par_iter().map(surface).collect::<Vec<_>>();
-    Ok(surfaces.into_iter().filter(|(s, _)| s.p.is_finite() && s.ng.is_normalized()).collect())
+    let points = chosen.into_par_iter().map(surface).collect::<Vec<_>>();
+    let is_sound = |p: &SurfacePoint| p.surface.p.is_finite() && p.surface.ng.is_normalized();
+    Ok((points.into_iter().filter(is_sound).collect(), atlas.size))
 }
 
 /// What of its chart's area is each texel's, m²: charts are stretched to whole texels, so that these differ in size.

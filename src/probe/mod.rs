@@ -1,9 +1,10 @@
 //! What every kind of probe shares: where probes stand ([`places`]: on a grid, [`placement`] and [`reach`]; or on a scene's skeleton,
-//! [`nonuniform`]: [`skeleton`], [`clip`], [`coverage`], [`select`], [`refine`], [`plan_picture`]; their weights: [`neighbors`]), how directions and texels belong together
+//! [`nonuniform`]: [`skeleton`], [`clip`], [`coverage`], [`select`], [`refine`], [`plan_picture`], [`coverage_picture`]; their weights: [`neighbors`]), how directions and texels belong together
 //! ([`parameter_map`], [`mesh_inverse`]; [`octahedral`]), what a texel holds ([`file`]), and folders of them ([`set`], [`store`]).
 
 pub mod clip;
 pub mod coverage;
+pub mod coverage_picture;
 pub mod file;
 pub mod mesh_inverse;
 pub mod neighbors;

@@ -63,6 +63,7 @@ pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
         ("curvature", &["device", "seed"]),
         ("compare", &[&["device", "seed"][..], &SCENE].concat()),
         ("devices", &[&["device", "seed", "threads"][..], &SCENE].concat()),
+        ("inspect-lightfield", &["device", "seed"]),
         ("info", &["device", "seed"]),
     ] {
         let hidden: Vec<clap::Arg> =

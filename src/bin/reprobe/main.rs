@@ -10,6 +10,7 @@ mod curvature;
 mod devices;
 mod evaluate;
 mod info;
+mod inspect_lightfield;
 mod place_probes;
 mod preset;
 mod qhmap;
@@ -57,6 +58,7 @@ enum Command {
     BakeLightfield(bake_lightfield::Args),
     RenderPath(render_path::Args),
     Compare(compare::Args),
+    InspectLightfield(inspect_lightfield::Args),
     Devices(devices::Args),
     Info(info::Args),
     Run(run::Args),
@@ -114,6 +116,7 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::BakeLightfield(args) => args.stage().into(),
         Command::RenderPath(args) => args.stage().into(),
         Command::Compare(args) => args.stage().into(),
+        Command::InspectLightfield(args) => args.stage().into(),
         Command::Devices(args) => return devices::run(&args),
         Command::Info(args) => {
             cx.refuse_gpu("info")?;
@@ -132,7 +135,7 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
 mod tests {
     use super::*;
     use reprobe::plan::stages::{
-        BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap,
+        BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap, RenderPath, Resmap,
     };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -149,6 +152,7 @@ mod tests {
             (BakeProbes::COMMAND, BakeProbes::OPTIONS),
             (RenderPath::COMMAND, RenderPath::OPTIONS),
             (Compare::COMMAND, Compare::OPTIONS),
+            (InspectLightfield::COMMAND, InspectLightfield::OPTIONS),
         ] {
             let sub = cli.find_subcommand(command).unwrap_or_else(|| panic!("no subcommand {command}"));
             let mut typed: Vec<String> = sub.get_arguments().filter_map(|a| Some(format!("--{}", a.get_long()?))).collect();

@@ -21,7 +21,8 @@ use std::path::PathBuf;
   reprobe place-probes room/scene.xml -o probes.json --grid 4x3x4 --path room/path.json
   reprobe place-probes room/scene.xml -o probes.json --spacing 0.5 --bounds=-2,0.2,-2,2,2.2,2
   reprobe place-probes room/scene.xml -o probes.json --method sdf --coverage 0.999 --picture plan.png
-  reprobe place-probes room/scene.xml -o probes.json --method medial-axis --count 24 --refine 20")]
+  reprobe place-probes room/scene.xml -o probes.json --method medial-axis --count 24 --refine 20
+  reprobe place-probes room/scene.xml -o probes.json --path room/path.json --grid 4x3x4 --coverage-picture coverage.png")]
 pub struct Args {
     /// Mitsuba scene, XML or JSON
     #[arg(value_name = "SCENE")]
@@ -59,12 +60,44 @@ pub struct Args {
     /// Draw the probes in the scene from above and from the side; magenta is what none of them sees
     #[arg(long, value_name = "FILE.png")]
     picture: Option<PathBuf>,
+    /// Draw how many probes see each place: on the surfaces' atlas, and in the view of the path's first camera, or the sensor's; magenta is
+    /// what none of them sees
+    #[arg(long, value_name = "FILE.png")]
+    coverage_picture: Option<PathBuf>,
 }
 
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> PlaceProbes {
-        let Self { scene, output, method, grid, count, spacing, coverage, refine, bounds, path, margin, picture } = self;
-        PlaceProbes { scene, method, grid, count, spacing, coverage, refine, bounds, path, margin, picture, output }
+        let Self {
+            scene,
+            output,
+            method,
+            grid,
+            count,
+            spacing,
+            coverage,
+            refine,
+            bounds,
+            path,
+            margin,
+            picture,
+            coverage_picture,
+        } = self;
+        PlaceProbes {
+            scene,
+            method,
+            grid,
+            count,
+            spacing,
+            coverage,
+            refine,
+            bounds,
+            path,
+            margin,
+            picture,
+            coverage_picture,
+            output,
+        }
     }
 }

@@ -22,6 +22,24 @@ pub enum Search {
     HiZ,
 }
 
+impl std::fmt::Display for Search {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::TwoScale => "two-scale",
+            Self::HiZ => "hi-z",
+        })
+    }
+}
+
+impl std::str::FromStr for Search {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let known = [Self::TwoScale, Self::HiZ].into_iter().find(|search| search.to_string() == text);
+        known.ok_or_else(|| "expected two-scale or hi-z".into())
+    }
+}
+
 /// Level of the coarse squares of [`Search::TwoScale`].
 pub(crate) const COARSE: usize = 4;
 /// Coarsest level of [`Search::HiZ`]: squares that hold a quarter of an edge hold near and far.

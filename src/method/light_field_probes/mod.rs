@@ -10,6 +10,7 @@ pub mod ambient;
 pub mod bake;
 pub mod gpu;
 pub mod hits;
+pub mod inspect;
 pub mod lobe;
 pub mod march;
 pub mod octree;

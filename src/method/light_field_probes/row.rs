@@ -1,9 +1,9 @@
 //! Light field probes in the table of methods.
 
+use super::LightFieldParams;
 use super::gpu::LightFieldOnGpu;
 use super::shade::Shading;
 use super::store::LightField;
-use super::{LightFieldParams, march::Search};
 use crate::base::clock::Clock;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
@@ -35,12 +35,8 @@ pub const METHOD: Method = Method {
 
 fn parameters(options: &Options) -> Result<Value> {
     let base = LightFieldParams::default();
-    let search = match options.trace.as_deref() {
-        None => base.search,
-        Some("two-scale") => Search::TwoScale,
-        Some("hi-z") => Search::HiZ,
-        Some(other) => return Err(Error::Request(format!("--trace {other}: expected two-scale or hi-z"))),
-    };
+    let named = |name: &String| name.parse().map_err(|e| Error::Request(format!("--trace {name}: {e}")));
+    let search = options.trace.as_ref().map_or(Ok(base.search), named)?;
     let base = LightFieldParams {
         supersample: options.supersample.unwrap_or(base.supersample),
         samples: options.samples.unwrap_or(base.samples),

@@ -43,15 +43,32 @@ pub fn files(folder: &Path, index: usize) -> [PathBuf; 3] {
     ["", "_light", "_ambient"].map(|ending| folder.join(format!("{index:04}{ending}.exr")))
 }
 
+/// What every `set.json` says.
+#[derive(Deserialize)]
+struct Source {
+    provenance: Provenance,
+}
+
 impl LightFieldSet {
+    /// The subcommand that writes it.
+    const STAGE: &str = "bake-lightfield";
+
     /// Reads `set.json`.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = ProbeSet::path(folder);
-        let set: Self = json::parse(&path, &read_set(folder, "bake-lightfield")?)?;
-        if set.provenance.stage != "bake-lightfield" || set.files.len() != set.places.len() {
-            return Err(Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"));
-        }
-        Ok(set)
+        let text = read_set(folder, Self::STAGE)?;
+        let is_ours = json::parse::<Source>(&path, &text)?.provenance.stage == Self::STAGE;
+        let set = if is_ours { Some(json::parse::<Self>(&path, &text)?) } else { None };
+        set.filter(|set| set.files.len() == set.places.len())
+            .ok_or_else(|| Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"))
+    }
+
+    /// The [`files`] of a probe that is not blocked.
+    pub fn images(&self, folder: &Path, index: usize) -> Result<[ExrImage; 3]> {
+        let [seen, light, around] = files(folder, index);
+        let (size, ambient) = (self.bake.size as usize, self.bake.ambient_size as usize);
+        let read = |path, size| member(path, size, &self.provenance);
+        Ok([read(&seen, size)?, read(&light, size)?, read(&around, ambient)?])
     }
 }
 
@@ -97,17 +114,15 @@ impl LightField {
     pub fn load(folder: &Path, scene: &Scene) -> Result<Self> {
         let set = LightFieldSet::read(folder)?;
         set.provenance.check_scene(&ProbeSet::path(folder), &scene.hash)?;
-        let (size, ambient_size) = (set.bake.size as usize, set.bake.ambient_size as usize);
+        let size = set.bake.size as usize;
         let read = |i: usize| {
             if set.places.is_blocked(i) {
                 return Ok((Map::new(no_surfels()), Light::new(&[Rgb::ZERO], 1), Ambient::dark()));
             }
-            let paths = files(folder, i);
-            let seen = member(&paths[0], size, &set.provenance)?;
+            let (paths, [seen, light, around]) = (files(folder, i), set.images(folder, i)?);
             let surfels = surfels(&paths[0], &seen)?;
-            let light = member(&paths[1], size, &set.provenance)?.rgb(&paths[1], "radiance")?;
-            let ambient = ambient(&paths[2], &member(&paths[2], ambient_size, &set.provenance)?)?;
-            Ok((Map::new(surfels), Light::new(&light, size), ambient))
+            let light = light.rgb(&paths[1], "radiance")?;
+            Ok((Map::new(surfels), Light::new(&light, size), ambient(&paths[2], &around)?))
         };
         let all: Vec<(Map, Light, Ambient)> = (0..set.places.len()).into_par_iter().map(read).collect::<Result<_>>()?;
         let octree = match set.places {

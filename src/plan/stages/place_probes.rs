@@ -4,13 +4,14 @@ use crate::base::clock::seconds;
 use crate::io::{Provenance, picture};
 use crate::plan::option::{List, stage, text};
 use crate::plan::{Context, Outcome};
+use crate::probe::coverage_picture::{self, Coverage};
 use crate::probe::nonuniform::{Bounds, COVERAGE, NonuniformParams, Reachable, place};
 use crate::probe::placement::{Density, PROBES_MAX, Placement, ProbeGrid};
 use crate::probe::places::ProbeList;
-use crate::probe::plan_picture::draw;
+use crate::probe::plan_picture;
 use crate::probe::reach::{ReachParams, blocked, reach};
 use crate::probe::refine::RefineParams;
-use crate::scene::{Scene, camera_path};
+use crate::scene::{Camera, Scene, camera_path};
 use crate::transport::World;
 use crate::{Error, Result};
 use glam::Vec3;
@@ -50,6 +51,8 @@ stage! {
         "--margin" margin: Option<f32>,
         /// A drawing of the probes in the scene, PNG.
         "--picture" picture: Option<PathBuf>,
+        /// A heat map of how many probes see each place, PNG.
+        "--coverage-picture" coverage_picture: Option<PathBuf>,
         /// The file to write.
         "--output" output: PathBuf,
     }
@@ -57,7 +60,10 @@ stage! {
 
 /// What every method starts from.
 struct Ground {
+    /// Where cameras stand.
     cameras: Vec<Vec3>,
+    /// The first of them.
+    first: Option<Camera>,
     bounds: Bounds,
 }
 
@@ -87,10 +93,17 @@ impl PlaceProbes {
         if self.bounds.is_some() && self.path.is_some() {
             return Err(Error::Request("--bounds, --path: expected one of them".into()));
         }
-        if let Some(path) = &self.picture {
+        for path in [&self.picture, &self.coverage_picture].into_iter().flatten() {
             picture::check_png(path)?;
         }
+        if self.picture.is_some() && self.picture == self.coverage_picture {
+            return Err(Error::Request("--picture, --coverage-picture: expected two files".into()));
+        }
         Ok(())
+    }
+
+    fn draws(&self) -> bool {
+        self.picture.is_some() || self.coverage_picture.is_some()
     }
 
     /// Refuses options that the method has no use for, and values out of their range.
@@ -151,7 +164,7 @@ impl PlaceProbes {
         if !ground.cameras.is_empty() {
             grid.blocked = blocked(world, &grid, &ground.cameras);
         }
-        let coverage = self.draw_grid(world, ground, &grid)?;
+        let coverage = self.draw_grid(cx, world, ground, &grid)?;
         grid.write(&self.output)?;
         let ([nx, ny, nz], [sx, sy, sz]) = (grid.counts, grid.spacing);
         let mut figures = json!({
@@ -171,16 +184,18 @@ impl PlaceProbes {
         Ok(Outcome { summary, figures, ..Outcome::default() })
     }
 
-    /// The picture of a grid, if it is asked for, and what the probes that are not blocked see.
-    fn draw_grid(&self, world: &World, ground: &Ground, grid: &ProbeGrid) -> Result<Option<f64>> {
-        let Some(picture) = &self.picture else { return Ok(None) };
+    /// The pictures of a grid, if they are asked for, and what the probes that are not blocked see.
+    fn draw_grid(&self, cx: &Context, world: &World, ground: &Ground, grid: &ProbeGrid) -> Result<Option<f64>> {
+        if !self.draws() {
+            return Ok(None);
+        }
         // As the other methods would have it, so that shares can be compared.
         let bounds = Bounds { filled: ground.bounds.seen, ..ground.bounds };
         let reachable = Reachable::new(world, &bounds, &ground.cameras, &NonuniformParams::default())?;
         let used: Vec<Vec3> = grid.used().into_iter().map(|i| grid.position(i)).collect();
-        write_picture(picture, world, &reachable, &used)?;
         let times = reachable.sides.times_seen(&reachable.sides.rows(world, &used));
-        let seen: f64 = reachable.sides.list.iter().zip(times).filter(|(_, n)| *n > 0).map(|(s, _)| f64::from(s.area)).sum();
+        self.draw(cx, world, (ground, &reachable), (&used, &times))?;
+        let seen: f64 = reachable.sides.list.iter().zip(&times).filter(|(_, n)| **n > 0).map(|(s, _)| f64::from(s.area)).sum();
         Ok(Some(seen / reachable.sides.area))
     }
 
@@ -211,9 +226,8 @@ impl PlaceProbes {
         };
         list.write(&self.output)?;
         let seconds = clock();
-        if let Some(picture) = &self.picture {
-            write_picture(picture, world, &reachable, &placed.positions)?;
-        }
+        let times = reachable.sides.times_seen(&placed.rows);
+        self.draw(cx, world, (ground, &reachable), (&placed.positions, &times))?;
         let (lower, upper) = ground.bounds.filled;
         let refined = match self.refine {
             Some(n) => format!("; after {n} passes of refinement {}", percent(placed.after.coverage)),
@@ -234,6 +248,24 @@ impl PlaceProbes {
         })
     }
 
+    /// Writes the pictures that are asked for; `times`: how many probes see each side.
+    fn draw(
+        &self,
+        cx: &Context,
+        world: &World,
+        (ground, reachable): (&Ground, &Reachable),
+        (probes, times): (&[Vec3], &[u32]),
+    ) -> Result<()> {
+        if let Some(path) = &self.picture {
+            plan_picture::draw(world, &reachable.space, probes).write(path)?;
+        }
+        if let (Some(path), Some(camera)) = (&self.coverage_picture, &ground.first) {
+            let coverage = Coverage { sides: &reachable.sides, times, probes, camera };
+            coverage_picture::draw(world, &coverage, cx.progress()).write(path)?;
+        }
+        Ok(())
+    }
+
     /// Where an output comes from: a method's parameters, and what all methods have.
     fn provenance(&self, cx: &Context, world: &World, ground: &Ground, method: serde_json::Value) -> Provenance {
         let (lower, upper) = ground.bounds.filled;
@@ -247,10 +279,11 @@ impl PlaceProbes {
     /// Where cameras stand, and the boxes. A grid fills the space that a path moves in; the other methods fill all that its cameras see:
     /// from there they have something to choose.
     fn ground(&self, world: &World) -> Result<Ground> {
-        let cameras = self.cameras(&world.scene)?;
+        let views = self.cameras(&world.scene)?;
+        let cameras: Vec<Vec3> = views.iter().map(Camera::position).collect();
         let seen = |margin: f32| reach(world, &cameras, &ReachParams { margin, ..self.reach() });
         let is_grid = self.method.unwrap_or_default() == Placement::Grid;
-        if cameras.is_empty() && (!is_grid || self.picture.is_some()) {
+        if cameras.is_empty() && (!is_grid || self.draws()) {
             return Err(Error::input(&self.scene, "has no sensor: a camera says which space is free; give --path"));
         }
         let filled = match self.bounds {
@@ -259,24 +292,17 @@ impl PlaceProbes {
             None => seen(if is_grid { self.reach().margin } else { f32::INFINITY })?,
         };
         // A grid with neither picture nor cameras has no use for it.
-        let seen = if is_grid && self.picture.is_none() { filled } else { seen(f32::INFINITY)? };
-        Ok(Ground { cameras, bounds: Bounds { filled, seen } })
+        let seen = if is_grid && !self.draws() { filled } else { seen(f32::INFINITY)? };
+        Ok(Ground { cameras, first: views.into_iter().next(), bounds: Bounds { filled, seen } })
     }
 
-    /// Where the camera stands: along the path, or the scene's own sensor.
-    fn cameras(&self, scene: &Scene) -> Result<Vec<Vec3>> {
+    /// The cameras of the path, or the scene's own sensor.
+    fn cameras(&self, scene: &Scene) -> Result<Vec<Camera>> {
         Ok(match &self.path {
-            Some(path) => {
-                camera_path::load(path, scene.sensor.as_ref(), scene.unit_scale.0)?.iter().map(|c| c.position()).collect()
-            }
-            None => scene.sensor.iter().map(|c| c.position()).collect(),
+            Some(path) => camera_path::load(path, scene.sensor.as_ref(), scene.unit_scale.0)?,
+            None => scene.sensor.iter().cloned().collect(),
         })
     }
-}
-
-fn write_picture(path: &std::path::Path, world: &World, reachable: &Reachable, probes: &[Vec3]) -> Result<()> {
-    let drawing = draw(world, &reachable.space, probes);
-    picture::write_png(path, &drawing.rgb, drawing.size)
 }
 
 /// A share as people read it; never 100 % of what is less.

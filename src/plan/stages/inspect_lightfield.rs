@@ -1,0 +1,177 @@
+//! `inspect-lightfield`.
+
+use crate::base::named::within;
+use crate::io::picture;
+use crate::method::light_field_probes::LightFieldParams;
+use crate::method::light_field_probes::inspect::way::{Way, ray_of};
+use crate::method::light_field_probes::inspect::{draw, maps};
+use crate::method::light_field_probes::march::Search;
+use crate::method::light_field_probes::store::{LightField, LightFieldSet};
+use crate::plan::option::{List, Size, stage, text};
+use crate::plan::views::views;
+use crate::plan::{Context, Outcome};
+use crate::probe::coverage::is_opaque;
+use crate::probe::reach::{ReachParams, reach};
+use crate::probe::set::ProbeSet;
+use crate::probe::skeleton::field::Field;
+use crate::probe::skeleton::space::Space;
+use crate::probe::skeleton::voxels::Voxels;
+use crate::transport::World;
+use crate::view::View;
+use crate::{Error, Result};
+use glam::Vec3;
+use serde_json::json;
+use std::path::PathBuf;
+
+text!(Search);
+
+stage! {
+    /// Draws what light field probes hold, or a ray's way through them.
+    InspectLightfield "inspect-lightfield"
+    {
+        /// The scene.
+        scene,
+    }
+    {
+        /// Light field probes.
+        "--probes" probes: PathBuf,
+        /// The probe whose maps are drawn.
+        "--probe" probe: Option<u32>,
+        /// Stops by which its colours are brightened.
+        "--exposure" exposure: Option<f32>,
+        /// The pixel whose ray is followed: column and row.
+        "--pixel" pixel: Option<List<u32, 2, ','>>,
+        /// The camera path; the scene's own sensor without it.
+        "--path" path: Option<PathBuf>,
+        /// Its frame.
+        "--frame" frame: Option<u32>,
+        /// Size of the frame.
+        "--size" size: Option<Size>,
+        /// How a probe's map is searched.
+        "--trace" trace: Option<Search>,
+        /// The picture to write, PNG.
+        "--output" output: PathBuf,
+    }
+}
+
+/// Voxels along the longest side of what is drawn.
+const RESOLUTION: u32 = 96;
+/// Room about it, as a share of that side.
+const MARGIN: f32 = 0.02;
+
+impl InspectLightfield {
+    /// Refuses what does not go together.
+    pub fn check(&self) -> Result<()> {
+        picture::check_png(&self.output)?;
+        if self.probe.is_some() == self.pixel.is_some() {
+            return Err(Error::Request("--probe, --pixel: expected one of them: a probe's maps, or a ray's way".into()));
+        }
+        let has = if self.probe.is_some() { "--probe" } else { "--pixel" };
+        for (option, is_given, with) in [
+            ("--exposure", self.exposure.is_some(), "--probe"),
+            ("--path", self.path.is_some(), "--pixel"),
+            ("--frame", self.frame.is_some(), "--pixel"),
+            ("--size", self.size.is_some(), "--pixel"),
+            ("--trace", self.trace.is_some(), "--pixel"),
+        ] {
+            if is_given && with != has {
+                return Err(Error::Request(format!("{option}: {has} has no use for it; {with} has")));
+            }
+        }
+        within("--exposure", self.exposure.unwrap_or(0.0), -32.0..=32.0)
+    }
+
+    /// Reads, draws, writes the picture.
+    pub fn run(&self, cx: &Context) -> Result<Outcome> {
+        self.check()?;
+        let set = LightFieldSet::read(&self.probes)?;
+        let world = cx.opaque_world(&self.scene)?;
+        set.provenance.check_scene(&ProbeSet::path(&self.probes), &world.scene.hash)?;
+        match (self.probe, self.pixel) {
+            (Some(probe), _) => self.draw_maps(&set, probe as usize),
+            (None, pixel) => self.draw_way(cx, &world, pixel.map_or([0; 2], |p| p.0)),
+        }
+    }
+
+    fn draw_maps(&self, set: &LightFieldSet, probe: usize) -> Result<Outcome> {
+        let places = &set.places;
+        if probe >= places.len() {
+            let last = places.len() - 1;
+            return Err(Error::Request(format!("--probe {probe}: {} has probes 0 to {last}", self.probes.display())));
+        }
+        if places.is_blocked(probe) {
+            let p = places.position(probe);
+            let used = places.used().into_iter().min_by(|&a, &b| {
+                let [a, b] = [a, b].map(|i| places.position(i).distance(p));
+                a.total_cmp(&b)
+            });
+            let hint = used.map_or_else(String::new, |i| format!("; the nearest one that is not is {i}"));
+            return Err(Error::Request(format!(
+                "--probe {probe}: is blocked, inside an object or behind a wall, and holds nothing{hint}"
+            )));
+        }
+        let p = places.position(probe);
+        let title =
+            format!("probe {probe} of {} at {p:.3}: +Y in the middle, -Y in the corners, +X right, +Z below", places.len());
+        let (canvas, shown) = maps::draw(&title, &set.images(&self.probes, probe)?, self.exposure.unwrap_or(0.0));
+        canvas.write(&self.output)?;
+        let mut summary = format!("{}: probe {probe} at {p:.3}\n", self.output.display());
+        for map in &shown {
+            summary += &format!("  {:10} {}\n", map.layer, map.legend);
+        }
+        let layers: serde_json::Map<String, serde_json::Value> =
+            shown.into_iter().map(|map| (map.layer, map.legend.into())).collect();
+        Ok(Outcome {
+            summary,
+            figures: json!({ "probe": probe, "position": p.to_array(), "maps": layers }),
+            ..Outcome::default()
+        })
+    }
+
+    fn draw_way(&self, cx: &Context, world: &World, [x, y]: [u32; 2]) -> Result<Outcome> {
+        let views = views(&world.scene, self.path.as_deref(), self.size.map(|s| s.0), None)?;
+        let number = self.frame.unwrap_or(0);
+        let of_frames = || Error::Request(format!("--frame {number}: the path has frames 0 to {}", views.len() - 1));
+        let camera = &views.get(number as usize).ok_or_else(of_frames)?.camera;
+        let [width, height] = camera.size;
+        if x >= width || y >= height {
+            return Err(Error::Request(format!(
+                "--pixel {x},{y}: frame {number} has {width} x {height} pixels: expected from 0,0 to {},{}",
+                width - 1,
+                height - 1
+            )));
+        }
+        let (low, high) = world.scene.geometry.bounds();
+        let far = 2.0 * low.distance(high).max(f32::MIN_POSITIVE);
+        let asked = ray_of(world, camera, [x, y], far).ok_or_else(|| {
+            Error::Request(format!("--pixel {x},{y}: frame {number} shows no surface there: choose another pixel"))
+        })?;
+        let field = LightField::load(&self.probes, &world.scene)?;
+        let params = LightFieldParams::default();
+        let search = self.trace.unwrap_or(params.search);
+        let way = Way::new((world, &field), asked, search, params.thickness);
+        let space = space(world, &views, &field)?;
+        let title = format!("frame {number}, pixel {x},{y}: {}, {search}", way.kind());
+        draw((world, &space), &field, &way, &title).write(&self.output)?;
+        cx.listener.detail(&format!("{} probes were asked", way.steps.len()));
+        let mut figures = way.figures();
+        figures["frame"] = number.into();
+        figures["pixel"] = json!([x, y]);
+        figures["trace"] = search.to_string().into();
+        Ok(Outcome { summary: format!("{}: {title}\n{}", self.output.display(), way.text()), figures, ..Outcome::default() })
+    }
+}
+
+/// The free space of what cameras see and where probes stand.
+fn space(world: &World, views: &[View], field: &LightField) -> Result<Space> {
+    let cameras: Vec<Vec3> = views.iter().map(|view| view.camera.position()).collect();
+    let params = ReachParams { margin: f32::INFINITY, ..ReachParams::default() };
+    let (mut lower, mut upper) = reach(world, &cameras, &params)?;
+    for probe in field.places.used() {
+        let p = field.places.position(probe);
+        (lower, upper) = (lower.min(p), upper.max(p));
+    }
+    let margin = MARGIN * (upper - lower).max_element();
+    let voxels = Voxels::in_box(lower - margin, upper + margin, RESOLUTION)?;
+    Space::reached(world, Field::of(&world.scene.geometry, &|t| is_opaque(world, t), voxels), &cameras)
+}
