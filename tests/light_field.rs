@@ -135,6 +135,11 @@ fn what_does_not_fit_is_refused() {
     let other = RENDER.replace("scene.xml", "other.xml");
     assert!(f.refusal(&format!("{other} --probes lightfield -o frames")).contains("another scene"));
     assert!(f.refusal(&format!("{} -o out", BAKE.replace("scene.xml", "other.xml"))).contains("another scene"));
+    // Probes in the middle of nowhere.
+    std::fs::write(f.at("open.xml"), "<scene version='3.0.0'><shape type='rectangle'/></scene>").unwrap();
+    f.success("place-probes open.xml --grid 2x1x1 --bounds=500,0,0,502,1,1 -o far.json");
+    let message = f.refusal("bake-lightfield open.xml --probes far.json --size 16 -o far");
+    assert!(message.contains("far.json") && message.contains("sees any surface"), "{message}");
     // Somebody else's probes.
     std::fs::write(f.at("lightfield/set.json"), "{}").unwrap();
     assert!(f.refusal(&format!("{RENDER} --probes lightfield -o frames")).contains("set.json"));

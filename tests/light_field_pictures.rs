@@ -5,7 +5,9 @@ mod folder;
 use folder::Folder;
 use image::RgbImage;
 use reprobe::io::picture::heat;
+use reprobe::method::light_field_probes::hits::Verdict;
 use reprobe::method::light_field_probes::inspect::COLOURS;
+use reprobe::method::light_field_probes::inspect::hits::colour;
 use reprobe::probe::coverage::UNSEEN;
 use serde_json::Value;
 
@@ -48,6 +50,24 @@ fn count(picture: &RgbImage, colour: [u8; 3]) -> usize {
 
 fn figures(f: &Folder, args: &str) -> Value {
     serde_json::from_str(&f.success(&format!("{args} --json"))).unwrap()
+}
+
+/// Eight probes in a room with a ball: nearly all rays meet what they meet in the scene, and the picture says the same as the words.
+#[test]
+fn all_rays_of_a_view_are_held_against_the_scene() {
+    let f = baked();
+    let figures = figures(&f, &format!("{INSPECT} --path path.json --hits -o hits.png"));
+    let share = |name: &str| figures["shares"][name].as_f64().unwrap();
+    let sum: f64 = ["right", "wrong", "missed", "false", "lost"].into_iter().map(share).sum();
+    assert!((sum - 1.0).abs() < 1e-9 && share("right") > 0.9 && figures["rays"].as_u64().unwrap() > 1000, "{figures}");
+    assert_eq!((figures["differ"].as_f64(), figures["probes"].as_u64()), (Some(0.0), Some(8)), "{figures}");
+    // Pixels all of whose rays are right are many of the glossy ones.
+    let right = count(&png(&f, "hits.png"), colour(Verdict::Right));
+    assert!(right > 20_000, "{right}");
+    let two = f.success(&format!("{INSPECT} --path path.json --hits --trace two-scale -o hits.png"));
+    assert!(two.contains("two-scale") && two.contains("0.000 % differ from hi-z"), "{two}");
+    assert!(f.refusal(&format!("{INSPECT} --hits --exposure 1 -o x.png")).contains("--exposure"));
+    assert!(f.refusal(&format!("{INSPECT} --path path.json --frame 1 --hits -o x.png")).contains("no glossy surface"));
 }
 
 #[test]

@@ -125,7 +125,7 @@ fn meet_texel(ray: LocalRay, t: vec2<f32>, i: u32) -> March {
     }
     let slack = params.field.thickness * (sqrt(4.0 * PI) / f32(n)) * depth;
     if above >= -slack {
-        return March(select(FREE, HIT, meets), t.x);
+        return March(select(FREE, HIT, meets && t.x >= slack), t.x);
     }
     return March(HIDDEN, t.x);
 }

@@ -14,7 +14,7 @@ use std::path::Path;
 pub struct ProbeList {
     /// How they were placed: any but [`Placement::Grid`].
     pub method: Placement,
-    /// Their positions, metres; those that see most of what no other one before them sees come first.
+    /// Their positions, metres; those that add most to what the ones before them see come first.
     pub positions: Vec<[f32; 3]>,
     /// Where the list came from.
     pub provenance: Provenance,

@@ -13,8 +13,9 @@ use std::path::PathBuf;
 ///
 /// The other methods look for places in the free space of all that cameras see, or of --bounds: what can be walked to from there. sdf takes those that are
 /// equally far from several surfaces, by a distance field; medial-axis the middles of balls that touch several surfaces. Of these,
-/// probes are chosen until they see enough, those first that see most of what no other sees; --refine moves them to where they see
-/// more, less at a slant and from farther away. A set without a grid serves the methods of frames that say so.
+/// probes are chosen until they see enough (--coverage), those first that see most of what no other sees; or so many (--count) that all
+/// surfaces are seen well by one of them, from near and not at a slant. --refine moves them to where they see more. Every stage takes
+/// such sets in the place of a grid.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe place-probes room/scene.xml -o probes.json

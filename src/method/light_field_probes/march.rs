@@ -201,8 +201,8 @@ impl Map {
         }
         let slack = thickness * self.surfels.texel_angle() * self.surfels.distance[i];
         match above >= -slack {
-            // Between two texels' planes, or just leaving this one.
-            true if meets => March::Hit { t: t[0], texel: i },
+            // Between two texels' planes; but so near to the ray's origin it is the surface that the ray leaves.
+            true if meets && t[0] >= slack => March::Hit { t: t[0], texel: i },
             true => March::Free,
             false => March::Hidden { t: t[0] },
         }

@@ -1,6 +1,5 @@
 //! `bake-lightfield`.
 
-use crate::Result;
 use crate::base::clock::seconds;
 use crate::base::math::Rgb;
 use crate::base::named::Parameters;
@@ -16,6 +15,7 @@ use crate::plan::{Context, Outcome};
 use crate::probe::places::Places;
 use crate::probe::set::ProbeSet;
 use crate::transport::World;
+use crate::{Error, Result};
 use rayon::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
@@ -116,6 +116,10 @@ impl BakeLightfield {
         let read = |i: usize| Seen::read(&files(&self.output, i)[0], params.size as usize, provenance);
         let surfels = |i: usize| if places.is_blocked(i) { Ok(no_surfels()) } else { read(i).map(|seen| seen.surfels) };
         let surfels: Vec<Surfels> = (0..places.len()).into_par_iter().map(surfels).collect::<Result<_>>()?;
+        if surfels.iter().all(|s| s.distance.iter().all(|d| d.is_infinite())) {
+            let message = "none of its probes sees any surface: place them in the scene (place-probes --path, --bounds)";
+            return Err(Error::input(&self.probes, message));
+        }
         let mut field = LightField::unlit(places.clone(), surfels);
         cx.progress().start("bounces of light", (probes.len() * params.bounces as usize) as u64);
         for bounces in 1..=params.bounces {

@@ -1,11 +1,14 @@
 //! `inspect-lightfield`.
 
+use crate::base::clock::Clock;
 use crate::base::named::within;
 use crate::io::picture;
 use crate::method::light_field_probes::LightFieldParams;
+use crate::method::light_field_probes::hits::{Verdict, differ, found, judge, lobe_rays};
 use crate::method::light_field_probes::inspect::way::{Way, ray_of};
-use crate::method::light_field_probes::inspect::{draw, maps};
+use crate::method::light_field_probes::inspect::{draw, hits, maps};
 use crate::method::light_field_probes::march::Search;
+use crate::method::light_field_probes::shade::Shading;
 use crate::method::light_field_probes::store::{LightField, LightFieldSet};
 use crate::plan::option::{List, Size, stage, text};
 use crate::plan::views::views;
@@ -18,6 +21,7 @@ use crate::probe::skeleton::space::Space;
 use crate::probe::skeleton::voxels::Voxels;
 use crate::transport::World;
 use crate::view::View;
+use crate::view::baseline::Baseline;
 use crate::{Error, Result};
 use glam::Vec3;
 use serde_json::json;
@@ -26,7 +30,7 @@ use std::path::PathBuf;
 text!(Search);
 
 stage! {
-    /// Draws what light field probes hold, or a ray's way through them.
+    /// Draws what light field probes hold, a ray's way through them, or what all rays meet.
     InspectLightfield "inspect-lightfield"
     {
         /// The scene.
@@ -39,6 +43,8 @@ stage! {
         "--probe" probe: Option<u32>,
         /// Stops by which its colours are brightened.
         "--exposure" exposure: Option<f32>,
+        /// Holds the rays of all glossy pixels against the scene.
+        "--hits" hits: bool,
         /// The pixel whose ray is followed: column and row.
         "--pixel" pixel: Option<List<u32, 2, ','>>,
         /// The camera path; the scene's own sensor without it.
@@ -63,16 +69,17 @@ impl InspectLightfield {
     /// Refuses what does not go together.
     pub fn check(&self) -> Result<()> {
         picture::check_png(&self.output)?;
-        if self.probe.is_some() == self.pixel.is_some() {
-            return Err(Error::Request("--probe, --pixel: expected one of them: a probe's maps, or a ray's way".into()));
+        if [self.probe.is_some(), self.pixel.is_some(), self.hits].into_iter().filter(|given| *given).count() != 1 {
+            let message = "--probe, --pixel, --hits: expected one of them: a probe's maps, a ray's way, or what all rays meet";
+            return Err(Error::Request(message.into()));
         }
-        let has = if self.probe.is_some() { "--probe" } else { "--pixel" };
+        let has = if self.probe.is_some() { "--probe" } else { "--pixel, --hits" };
         for (option, is_given, with) in [
             ("--exposure", self.exposure.is_some(), "--probe"),
-            ("--path", self.path.is_some(), "--pixel"),
-            ("--frame", self.frame.is_some(), "--pixel"),
-            ("--size", self.size.is_some(), "--pixel"),
-            ("--trace", self.trace.is_some(), "--pixel"),
+            ("--path", self.path.is_some(), "--pixel, --hits"),
+            ("--frame", self.frame.is_some(), "--pixel, --hits"),
+            ("--size", self.size.is_some(), "--pixel, --hits"),
+            ("--trace", self.trace.is_some(), "--pixel, --hits"),
         ] {
             if is_given && with != has {
                 return Err(Error::Request(format!("{option}: {has} has no use for it; {with} has")));
@@ -89,7 +96,8 @@ impl InspectLightfield {
         set.provenance.check_scene(&ProbeSet::path(&self.probes), &world.scene.hash)?;
         match (self.probe, self.pixel) {
             (Some(probe), _) => self.draw_maps(&set, probe as usize),
-            (None, pixel) => self.draw_way(cx, &world, pixel.map_or([0; 2], |p| p.0)),
+            (None, Some(pixel)) => self.draw_way(cx, &world, pixel.0),
+            (None, None) => self.draw_hits(&world),
         }
     }
 
@@ -128,11 +136,55 @@ impl InspectLightfield {
         })
     }
 
-    fn draw_way(&self, cx: &Context, world: &World, [x, y]: [u32; 2]) -> Result<Outcome> {
+    /// All views, and the number of the one that is asked for.
+    fn views(&self, world: &World) -> Result<(Vec<View>, usize)> {
         let views = views(&world.scene, self.path.as_deref(), self.size.map(|s| s.0), None)?;
-        let number = self.frame.unwrap_or(0);
-        let of_frames = || Error::Request(format!("--frame {number}: the path has frames 0 to {}", views.len() - 1));
-        let camera = &views.get(number as usize).ok_or_else(of_frames)?.camera;
+        let number = self.frame.unwrap_or(0) as usize;
+        if number >= views.len() {
+            return Err(Error::Request(format!("--frame {number}: the path has frames 0 to {}", views.len() - 1)));
+        }
+        Ok((views, number))
+    }
+
+    fn draw_hits(&self, world: &World) -> Result<Outcome> {
+        let (views, number) = self.views(world)?;
+        let field = LightField::load(&self.probes, &world.scene)?;
+        let params = LightFieldParams::default();
+        let view = Baseline::new(world, None, 1).gbuffer(&views[number].camera, &mut Clock::start());
+        let rays = lobe_rays(world, &view, params.samples, Shading::far(world));
+        if rays.is_empty() {
+            return Err(Error::Request(format!("--hits: frame {number} shows no glossy surface: choose another frame")));
+        }
+        let search = self.trace.unwrap_or(params.search);
+        let other = if search == Search::HiZ { Search::TwoScale } else { Search::HiZ };
+        let [(found, time), (others, other_time)] = [search, other].map(|s| found(&field, &rays, s, params.thickness));
+        let verdicts = judge(world, &field, &rays, &found);
+        let (words, shares) = shares(&verdicts);
+        let apart = found.iter().zip(&others).filter(|(a, b)| differ(**a, **b)).count() as f64 / rays.len() as f64;
+        let title = format!(
+            "frame {number}: {} rays along glossy lobes through {} probes, {search}",
+            rays.len(),
+            field.places.used().len()
+        );
+        hits::draw(&title, &view, &rays, &verdicts, &words).write(&self.output)?;
+        let lines: String = words.iter().map(|line| format!("  {line}\n")).collect();
+        Ok(Outcome {
+            summary: format!(
+                "{}: {title}\n{lines}  {:.3} % differ from {other}; {search} {time:.0} ns a ray, {other} {other_time:.0} ns",
+                self.output.display(),
+                100.0 * apart,
+            ),
+            figures: json!({
+                "frame": number, "rays": rays.len(), "probes": field.places.used().len(), "bytes": field.bytes(), "trace": search.to_string(),
+                "shares": shares, "differ": apart, "nanoseconds": { search.to_string(): time, other.to_string(): other_time },
+            }),
+            ..Outcome::default()
+        })
+    }
+
+    fn draw_way(&self, cx: &Context, world: &World, [x, y]: [u32; 2]) -> Result<Outcome> {
+        let (views, number) = self.views(world)?;
+        let camera = &views[number].camera;
         let [width, height] = camera.size;
         if x >= width || y >= height {
             return Err(Error::Request(format!(
@@ -141,9 +193,7 @@ impl InspectLightfield {
                 height - 1
             )));
         }
-        let (low, high) = world.scene.geometry.bounds();
-        let far = 2.0 * low.distance(high).max(f32::MIN_POSITIVE);
-        let asked = ray_of(world, camera, [x, y], far).ok_or_else(|| {
+        let asked = ray_of(world, camera, [x, y], Shading::far(world)).ok_or_else(|| {
             Error::Request(format!("--pixel {x},{y}: frame {number} shows no surface there: choose another pixel"))
         })?;
         let field = LightField::load(&self.probes, &world.scene)?;
@@ -160,6 +210,21 @@ impl InspectLightfield {
         figures["trace"] = search.to_string().into();
         Ok(Outcome { summary: format!("{}: {title}\n{}", self.output.display(), way.text()), figures, ..Outcome::default() })
     }
+}
+
+/// A sentence a verdict, and the shares by name.
+fn shares(verdicts: &[Verdict]) -> (Vec<String>, serde_json::Map<String, serde_json::Value>) {
+    let meanings = [
+        "meet what they meet in the scene",
+        "meet another place",
+        "meet nothing where there is something",
+        "meet something where there is nothing",
+        "are lost behind what probes see",
+    ];
+    let share = |verdict| verdicts.iter().filter(|v| **v == verdict).count() as f64 / verdicts.len().max(1) as f64;
+    let words =
+        Verdict::ALL.iter().zip(meanings).map(|((v, name), meaning)| format!("{name} {:.2} %: {meaning}", 100.0 * share(*v)));
+    (words.collect(), Verdict::ALL.iter().map(|(v, name)| ((*name).into(), share(*v).into())).collect())
 }
 
 /// The free space of what cameras see and where probes stand.
