@@ -24,6 +24,10 @@ use std::f32::consts::TAU;
 const TARGETS: usize = 24;
 /// Directions from a side that are tried next.
 const DIRECTIONS: u32 = 48;
+/// Cameras of a path that say which sides are seen.
+const CAMERAS: usize = 16;
+/// What a side that no camera sees counts: only reflections of what they do see show it.
+const UNSEEN_WEIGHT: f32 = 0.1;
 /// How much of its length a ray leaves out before the probe.
 const GAP: f32 = 1e-4;
 
@@ -39,6 +43,8 @@ pub struct Side {
     pub n: Vec3,
     /// Area, m².
     pub area: f32,
+    /// What it counts where probes are chosen by how well they see it, m²: its area, or less where no camera sees it.
+    pub weight: f32,
     /// Which of [`Sides::surface`] it is a side of.
     pub texel: u32,
     /// How far along `n` rays start, metres.
@@ -89,7 +95,15 @@ impl Sides {
             .map(|k| space.field.voxels.centre(free[(2 * k + 1) * free.len() / (2 * TARGETS)]))
             .collect();
         let sides_of = |(i, SurfacePoint { surface, area, .. }): (usize, &SurfacePoint)| {
-            let side = |n| Side { p: surface.p, n, area: *area, texel: i as u32, offset: surface.offset, witness: Vec3::ZERO };
+            let side = |n| Side {
+                p: surface.p,
+                n,
+                area: *area,
+                weight: *area,
+                texel: i as u32,
+                offset: surface.offset,
+                witness: Vec3::ZERO,
+            };
             let seen = |side: Side| Some(Side { witness: witness(world, space, &side, &targets)?, ..side });
             [surface.ng, -surface.ng].map(|n| seen(side(n)))
         };
@@ -114,6 +128,15 @@ impl Sides {
     /// What each of several probes sees.
     pub fn rows(&self, world: &World, probes: &[Vec3]) -> Vec<Row> {
         probes.par_iter().map(|&p| self.row(world, p)).collect()
+    }
+
+    /// Lets sides that none of `cameras` sees count less.
+    pub fn weigh(&mut self, world: &World, cameras: &[Vec3]) {
+        let step = cameras.len().div_ceil(CAMERAS).max(1);
+        self.list.par_iter_mut().for_each(|side| {
+            let is_seen = cameras.iter().step_by(step).any(|&camera| side.seen_from(world, camera).is_some());
+            side.weight = if is_seen { side.area } else { UNSEEN_WEIGHT * side.area };
+        });
     }
 
     /// Nothing seen.

@@ -103,7 +103,8 @@ impl Reachable {
         let within = (lower.min(seen.0) - 2.0 * voxels.edge, upper.max(seen.1) + 2.0 * voxels.edge);
         let field = Field::of(&world.scene.geometry, &|t| is_opaque(world, t), voxels);
         let space = Space::reached(world, field, cameras)?;
-        let sides = Sides::new(world, &space, within, params.texels)?;
+        let mut sides = Sides::new(world, &space, within, params.texels)?;
+        sides.weigh(world, cameras);
         if sides.list.is_empty() {
             return Err(Error::Request(
                 "the free space that the camera reaches sees no opaque surface: nothing to place probes for".into(),

@@ -198,7 +198,7 @@ fn a_count_of_probes_is_chosen_by_how_well_they_see() {
     let seen_by = |probes: &[Vec3]| -> f64 {
         let best = |side: &super::coverage::Side| {
             let well = |&p: &Vec3| side.seen_from(&world, p).map_or(0.0, |(cos, d)| cos / (1.0 + d * d / (near * near)));
-            f64::from(side.area) * f64::from(probes.iter().map(well).fold(0.0, f32::max))
+            f64::from(side.weight) * f64::from(probes.iter().map(well).fold(0.0, f32::max))
         };
         sides.list.iter().map(best).sum()
     };

@@ -4,7 +4,7 @@
 //! Where coverage is asked for, the next is the candidate that sees the most of what no probe before it saw, until enough is seen; where
 //! candidates are left that see nothing new, further ones come from the free space before the sides that are still unseen, so that full
 //! coverage is always in reach. Where a number of probes is asked for, it is the candidate that most improves how well all sides are seen by
-//! the probe that sees each best (§3.2: not at a slant, and not from far away). Either gain only shrinks as probes are added: the
+//! the probe that sees each best (§3.2: not at a slant, and not from far away), those that cameras see first of all. Either gain only shrinks as probes are added: the
 //! choice is within 1 - 1/e of the best one (Nemhauser et al. 1978), and gains of earlier rounds bound those of later ones.
 
 use super::coverage::{Row, Side, Sides, bits};
@@ -121,7 +121,7 @@ fn best_views(world: &World, sides: &Sides, candidates: Vec<Vec3>, count: usize,
 fn gain(sides: &Sides, row: &Row, probe: Vec3, seen: &[f32], near: f32) -> f64 {
     let more = |i: usize| {
         let side = &sides.list[i];
-        f64::from(side.area * (view(side, probe, near) - seen[i]).max(0.0))
+        f64::from(side.weight * (view(side, probe, near) - seen[i]).max(0.0))
     };
     bits(row.iter().copied()).map(more).sum()
 }
