@@ -406,7 +406,7 @@ mod tests {
             ("ulr", &["supersample=0", "blend=0", "blend=100000", "probes=0", "angle=-1"]),
             ("image-space-gather", &["supersample=0", "samples=0", "search_samples=0", "plane_sigma=0", "max_radius=1e9"]),
             ("lightmap-rt", &["supersample=0", "samples=0", "bounces=0"]),
-            ("light-field-probes", &["supersample=0", "samples=0", "direct_samples=0", "thickness=-1", "search=all"]),
+            ("light-field-probes", &["supersample=0", "samples=0", "direct_samples=65537", "thickness=-1", "search=all"]),
             ("path-trace", &["levels=100", "despeckle=25", "normal_power=-1"]),
         ] {
             for set in sets {
