@@ -5,7 +5,7 @@ use super::march::{LocalRay, Map, March, Search};
 use super::octree::NO_PROBE;
 use super::probe::Light;
 use super::store::{LightField, probe_bytes};
-use super::trace::{Found, trace};
+use super::trace::{Found, follow, trace};
 use crate::base::math::{Rgb, hash_words, unit};
 use crate::base::ray::Ray;
 use crate::exchange::{LoadOptions, load};
@@ -173,6 +173,39 @@ fn a_query_ends_whatever_a_map_holds() {
             for search in [Search::HiZ, Search::TwoScale] {
                 map.march(&LocalRay { o, d }, [0.0, 1e6], search, 1.0);
             }
+        }
+    }
+}
+
+/// Probes anywhere, who see anything: each is asked at most once, and places only go on along the ray.
+#[test]
+fn a_query_ends_whatever_a_set_holds() {
+    let n = 16;
+    for seed in 0..30 {
+        let place = |k: u32| (direction(seed * 100 + k) * 3.0 * random(k, seed)).to_array();
+        let surfels =
+            |k: u32| super::probe::Surfels {
+                size: n,
+                distance: (0..n * n)
+                    .map(|i| {
+                        if hash_words(&[seed, k, i as u32]).is_multiple_of(4) { f32::INFINITY } else { 4.0 * random(i as u32, k) }
+                    })
+                    .collect(),
+                normal: (0..n * n).map(|i| hash_words(&[seed, k, i as u32, 9])).collect(),
+            };
+        let count = 1 + seed % 20 * 3;
+        let field = LightField::unlit(listed((0..count).map(place).collect()), (0..count).map(surfels).collect());
+        field.octree.as_ref().unwrap().check(count as usize).unwrap();
+        for i in 0..100 {
+            let mut ray = Ray::new(direction(i) * 4.0 * random(i, 5), direction(i + 500));
+            ray.t_max = 1e4;
+            let mut steps = Vec::new();
+            let found = follow(&field, &ray, Search::HiZ, 1.0, &mut |step| steps.push(step));
+            let mut probes: Vec<usize> = steps.iter().map(|s| s.probe).collect();
+            probes.sort_unstable();
+            probes.dedup();
+            assert!(probes.len() == steps.len() && (1..=32).contains(&steps.len()), "{found:?}: {steps:?}");
+            assert!(steps.windows(2).all(|w| w[0].t <= w[1].t), "{steps:?}");
         }
     }
 }
