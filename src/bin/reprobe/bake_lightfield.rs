@@ -8,7 +8,8 @@ use std::path::PathBuf;
 /// Bake light field probes: octahedral maps of distance, normals, radiance, irradiance
 ///
 /// Writes NNNN.exr (distance, normal.X ..., direct light), NNNN_light.exr (radiance of all bounces) and NNNN_ambient.exr (irradiance and
-/// the moments of distance). Finished probes are kept; blocked ones are left out.
+/// the moments of distance); of probes in no grid also octree.json, which of them see a place. Finished probes are kept; blocked ones are
+/// left out. inspect-lightfield draws what comes of it.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe bake-lightfield room/scene.xml --probes probes.json -o lightfield/
