@@ -60,16 +60,16 @@ pub fn choose(world: &World, sides: &Sides, candidates: Vec<Vec3>, enough: &Enou
 fn until_covered(world: &World, sides: &Sides, mut candidates: Vec<Vec3>, share: f64, most: usize) -> Chosen {
     let mut rows = sides.rows(world, &candidates);
     let mut left: Vec<bool> = vec![true; candidates.len()];
-    let mut times = vec![0u32; sides.list.len()];
+    let mut unseen = sides.no_row();
+    (0..sides.list.len()).for_each(|i| unseen[i / 64] |= 1 << (i % 64));
     let mut chosen = Chosen::default();
     while chosen.positions.len() < most {
-        let unseen = unseen(&times);
         if 1.0 - sides.share(&unseen) >= share {
             break;
         }
         if let Some(best) = best(sides, &rows, &left, &unseen) {
             left[best] = false;
-            bits(rows[best].iter().copied()).for_each(|i| times[i] += 1);
+            unseen.iter_mut().zip(&rows[best]).for_each(|(unseen, row)| *unseen &= !row);
             chosen.positions.push(candidates[best]);
             chosen.rows.push(rows[best].clone());
         } else {
@@ -131,12 +131,6 @@ fn view(side: &Side, probe: Vec3, near: f32) -> f32 {
     let way = probe - side.p;
     let squared = way.length_squared().max(f32::MIN_POSITIVE);
     (side.n.dot(way) / squared.sqrt()).max(0.0) / (1.0 + squared / (near * near))
-}
-
-/// Sides that no probe sees.
-fn unseen(times: &[u32]) -> Row {
-    let word = |chunk: &[u32]| chunk.iter().enumerate().map(|(k, &n)| u64::from(n == 0) << k).sum();
-    times.chunks(64).map(word).collect()
 }
 
 fn common<'a>(a: &'a [u64], b: &'a [u64]) -> impl Iterator<Item = u64> + 'a {

@@ -5,9 +5,9 @@
 //! "iteratively re-injecting").
 
 use super::LightFieldParams;
-use super::lobe::along_lobe;
+use super::field::LightField;
+use super::lobe::along_lobes;
 use super::probe::{Ambient, Light, Surfels};
-use super::store::LightField;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{Parameters, within};
 use crate::base::ray::Ray;
@@ -115,15 +115,17 @@ pub fn bounce(
     (far, seed): (f32, u32),
     each: Each,
 ) -> Result<()> {
-    let (mut light, mut ambient) = (field.light.clone(), field.ambient.clone());
+    let mut next = Vec::new();
     for i in field.places.used() {
         let seen = seen(i)?;
         let radiance = if field.is_lit() { reinjected((world, field), (&seen, i), params, (far, seed)) } else { seen.direct };
-        light[i] = Light::new(&radiance, params.size as usize);
-        ambient[i] = Ambient::new(&seen.surfels, &radiance, params.ambient_size as usize, far);
-        each(i, &radiance, &ambient[i])?;
+        let ambient = Ambient::new(&seen.surfels, &radiance, params.ambient_size as usize, far);
+        each(i, &radiance, &ambient)?;
+        next.push((i, Light::new(&radiance, params.size as usize), ambient));
     }
-    (field.light, field.ambient) = (light, ambient);
+    for (i, light, ambient) in next {
+        (field.light[i], field.ambient[i]) = (light, ambient);
+    }
     Ok(())
 }
 
@@ -149,9 +151,7 @@ fn reinjected(
         let glossy = match world.intersect(&Ray::new(position, d)) {
             Some(surface) if view_alpha(world, &surface, -d).is_some() => {
                 let stream = hash_words(&[seed, index as u32, i as u32, 1]);
-                let ray = |s| along_lobe((world, field), (&surface, -d), (&lobes, far), &mut Sampler::new(stream, s));
-                let sum: Rgb = (0..lobes.samples).map(ray).filter(|c| c.is_finite()).sum();
-                sum / lobes.samples as f32
+                along_lobes((world, field), (&surface, -d), (&lobes, far), stream)
             }
             _ => Rgb::ZERO,
         };

@@ -1,14 +1,14 @@
 //! What rays through probes meet, held against what they meet in the scene.
 
+use super::field::LightField;
+use super::lobe::lobe_ray;
 use super::march::Search;
-use super::store::LightField;
 use super::trace::{Found, trace};
 use crate::base::clock::seconds;
 use crate::base::math::hash_words;
 use crate::base::ray::Ray;
 use crate::transport::{Sampler, World};
-use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel};
-use glam::Vec2;
+use crate::view::gbuffer::{GBuffer, Pixel};
 use rayon::prelude::*;
 
 /// Share of a ray's length by which a place may be off and still be the right one.
@@ -52,12 +52,10 @@ pub struct LobeRay {
 pub fn lobe_rays(world: &World, view: &GBuffer, samples: u32, far: f32) -> Vec<LobeRay> {
     let rays = |(i, pixel): (usize, &Option<Pixel>)| {
         let Some(p) = pixel.as_ref().filter(|p| p.alpha.is_some()) else { return Vec::new() };
-        let (surface, stream) = (&p.surface, hash_words(&[i as u32]));
-        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let stream = hash_words(&[i as u32]);
         let ray = |s| {
-            let [x, y, lobe, _] = Sampler::new(stream, s).next_4d();
-            let sample = bsdf.sample(surface, surface.frame.to_local(p.wo), lobe, Vec2::new(x, y), GLOSSY)?;
-            Some(LobeRay { pixel: i, ray: Ray { t_max: far, ..surface.spawn(surface.frame.to_world(sample.wo)) } })
+            let (ray, _) = lobe_ray(world, (&p.surface, p.wo), far, &mut Sampler::new(stream, s))?;
+            Some(LobeRay { pixel: i, ray })
         };
         (0..samples).filter_map(ray).collect()
     };

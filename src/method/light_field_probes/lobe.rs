@@ -1,29 +1,46 @@
 //! Light that comes along a glossy lobe, by rays through the probes and radiance as wide as each of them stands for.
 
 use super::LightFieldParams;
-use super::store::LightField;
+use super::field::LightField;
 use super::trace::{Found, trace};
 use crate::base::math::Rgb;
+use crate::base::ray::Ray;
 use crate::material::Surface;
+use crate::material::bsdf::BsdfSample;
 use crate::transport::{Sampler, World};
 use crate::view::gbuffer::GLOSSY;
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// One sample of the radiance that a surface scatters towards `wo` by its glossy lobes, without direct light; `params.samples` says how many
-/// there are. `far`: length of rays, metres.
-pub fn along_lobe(
+/// A ray along a glossy lobe of a surface that is seen from `wo`, no longer than `far` metres, and how it was drawn.
+pub fn lobe_ray(world: &World, (surface, wo): (&Surface, Vec3), far: f32, sampler: &mut Sampler) -> Option<(Ray, BsdfSample)> {
+    let [x, y, lobe, _] = sampler.next_4d();
+    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    let sample = bsdf.sample(surface, surface.frame.to_local(wo), lobe, Vec2::new(x, y), GLOSSY)?;
+    Some((Ray { t_max: far, ..surface.spawn(surface.frame.to_world(sample.wo)) }, sample))
+}
+
+/// The radiance that a surface scatters towards `wo` by its glossy lobes, without direct light: the mean of `params.samples` rays, whose random
+/// numbers are those of `stream`. `far`: length of rays, metres.
+pub fn along_lobes(
+    scene: (&World, &LightField),
+    surface: (&Surface, Vec3),
+    (params, far): (&LightFieldParams, f32),
+    stream: u32,
+) -> Rgb {
+    let ray = |s| along_lobe(scene, surface, (params, far), &mut Sampler::new(stream, s));
+    let sum: Rgb = (0..params.samples).map(ray).filter(|c| c.is_finite()).sum();
+    sum / params.samples as f32
+}
+
+/// One of them.
+fn along_lobe(
     (world, field): (&World, &LightField),
-    (surface, wo): (&Surface, Vec3),
+    surface: (&Surface, Vec3),
     (params, far): (&LightFieldParams, f32),
     sampler: &mut Sampler,
 ) -> Rgb {
-    let [x, y, lobe, _] = sampler.next_4d();
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
-    let wi = surface.frame.to_local(wo);
-    let Some(sample) = bsdf.sample(surface, wi, lobe, Vec2::new(x, y), GLOSSY) else { return Rgb::ZERO };
-    let mut ray = surface.spawn(surface.frame.to_world(sample.wo));
-    ray.t_max = far;
+    let Some((ray, sample)) = lobe_ray(world, surface, far, sampler) else { return Rgb::ZERO };
     let (probe, t, is_lost) = match trace(field, &ray, params.search, params.thickness) {
         Found::Surface { probe, t, .. } => (probe, t, false),
         Found::Lost { probe, t } => (probe, t, true),

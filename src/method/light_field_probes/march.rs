@@ -87,6 +87,34 @@ impl LocalRay {
         self.o + self.d * t
     }
 
+    /// Where its pieces from `t[0]` to `t[1]` begin and end, of which each is within an octant: so many distances along it, ascending.
+    pub fn cuts(&self, t: [f32; 2]) -> ([f32; 5], usize) {
+        let mut cuts = [t[0], f32::NAN, f32::NAN, f32::NAN, t[1]];
+        let mut count = 1;
+        for axis in 0..3 {
+            let cut = -self.o[axis] / self.d[axis];
+            if cut > t[0] && cut < t[1] {
+                cuts[count] = cut;
+                count += 1;
+            }
+        }
+        cuts[1..count].sort_unstable_by(f32::total_cmp);
+        cuts[count] = t[1];
+        (cuts, count + 1)
+    }
+
+    /// A piece between two neighbouring cuts: the ends of its straight line on the map, in [0, 1]², and |p|₁ there. `None` where it is no
+    /// longer than rounding.
+    pub fn piece(&self, t: [f32; 2]) -> Option<([Vec2; 2], [f32; 2])> {
+        let ends = t.map(|t| self.at(t));
+        let signs = Vec3::ONE.copysign(ends[0] + ends[1]);
+        let weight = ends.map(|p| p.dot(signs));
+        if t[1].partial_cmp(&t[0]) != Some(Ordering::Greater) || weight.iter().any(|w| *w <= 0.0) {
+            return None;
+        }
+        Some((ends.map(|p| (within_octant(p, signs) * 0.5 + 0.5).clamp(Vec2::ZERO, Vec2::ONE)), weight))
+    }
+
     /// Greatest distance from the probe between two places, which is at one of them.
     fn farthest(&self, t: [f32; 2]) -> f32 {
         t.map(|t| self.at(t).length_squared()).into_iter().fold(0.0, f32::max).sqrt()
@@ -119,18 +147,8 @@ impl Map {
 
     /// Follows a ray from `t[0]` to `t[1]`, both finite. `thickness`: how far behind a surface, in texels, a ray still counts as at it.
     pub fn march(&self, ray: &LocalRay, t: [f32; 2], search: Search, thickness: f32) -> March {
-        let mut cuts = [t[0], f32::NAN, f32::NAN, f32::NAN, t[1]];
-        let mut count = 1;
-        for axis in 0..3 {
-            let cut = -ray.o[axis] / ray.d[axis];
-            if cut > t[0] && cut < t[1] {
-                cuts[count] = cut;
-                count += 1;
-            }
-        }
-        cuts[1..count].sort_unstable_by(f32::total_cmp);
-        cuts[count] = t[1];
-        for ends in cuts[..=count].windows(2) {
+        let (cuts, count) = ray.cuts(t);
+        for ends in cuts[..count].windows(2) {
             let found = self.line([ends[0], ends[1]], ray).map(|line| self.follow(ray, &line, search, thickness));
             if let Some(found) = found.filter(|f| *f != March::Free) {
                 return found;
@@ -141,14 +159,8 @@ impl Map {
 
     /// The piece of a ray between two neighbouring cuts; `None` where it is no longer than rounding.
     fn line(&self, t: [f32; 2], ray: &LocalRay) -> Option<Line> {
-        let ends = t.map(|t| ray.at(t));
-        let signs = Vec3::ONE.copysign(ends[0] + ends[1]);
-        let weight = ends.map(|p| p.dot(signs));
-        if t[1].partial_cmp(&t[0]) != Some(Ordering::Greater) || weight.iter().any(|w| *w <= 0.0) {
-            return None;
-        }
-        let n = self.pyramid.size as f32;
-        let [from, to] = ends.map(|p| ((within_octant(p, signs) * 0.5 + 0.5) * n).clamp(Vec2::ZERO, Vec2::splat(n)));
+        let (places, weight) = ray.piece(t)?;
+        let [from, to] = places.map(|p| p * self.pyramid.size as f32);
         Some(Line { t, from, along: to - from, weight })
     }
 

@@ -8,6 +8,7 @@
 
 pub mod ambient;
 pub mod bake;
+pub mod field;
 pub mod gpu;
 pub mod hits;
 pub mod inspect;

@@ -1,9 +1,9 @@
 //! Light field probes in the table of methods.
 
 use super::LightFieldParams;
+use super::field::LightField;
 use super::gpu::LightFieldOnGpu;
 use super::shade::Shading;
-use super::store::LightField;
 use crate::base::clock::Clock;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;

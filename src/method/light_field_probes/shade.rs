@@ -1,8 +1,8 @@
 //! The layers of a view that light field probes light.
 
 use super::LightFieldParams;
-use super::lobe::along_lobe;
-use super::store::LightField;
+use super::field::LightField;
+use super::lobe::along_lobes;
 use crate::base::math::{Rgb, hash_words};
 use crate::material::bsdf::{Lobes, Query};
 use crate::transport::path::{PathParams, scattered};
@@ -61,11 +61,9 @@ impl Shading<'_> {
             if p.alpha.is_none() {
                 return Rgb::ZERO;
             }
-            let sampler = |s| Sampler::new(hash_words(&[stream, BRANCHES[2]]), s);
-            let rays = (0..self.params.samples)
-                .map(|s| along_lobe((self.world, self.field), (&p.surface, p.wo), (&self.params, self.far), &mut sampler(s)));
-            let sum: Rgb = rays.filter(|c| c.is_finite()).sum();
-            self.direct(p, GLOSSY, stream, BRANCHES[1]) + sum / self.params.samples as f32
+            let rays = hash_words(&[stream, BRANCHES[2]]);
+            let along = along_lobes((self.world, self.field), (&p.surface, p.wo), (&self.params, self.far), rays);
+            self.direct(p, GLOSSY, stream, BRANCHES[1]) + along
         })
     }
 

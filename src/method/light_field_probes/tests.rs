@@ -1,10 +1,11 @@
 //! Rays through probes against rays in the scene, and light in closed rooms.
 
 use super::bake::{LightFieldBakeParams, Seen, bounce, look};
+use super::field::LightField;
 use super::march::{LocalRay, Map, March, Search};
 use super::octree::NO_PROBE;
 use super::probe::Light;
-use super::store::{LightField, probe_bytes};
+use super::store::probe_bytes;
 use super::trace::{Found, follow, trace};
 use crate::base::math::{Rgb, hash_words, unit};
 use crate::base::ray::Ray;

@@ -4,9 +4,9 @@
 //! the probes about that place are asked. They are the eight of the grid's cell, or those of the octree's leaf. *Ours*: behind those of the leaf
 //! come the eight nearest, as a leaf knows four at most. Every probe is asked at most once, so that a query ends.
 
+use super::field::LightField;
 use super::march::{LocalRay, March, Search};
 use super::octree::{NO_PROBE, WIDTH};
-use super::store::LightField;
 use crate::base::ray::Ray;
 use glam::Vec3;
 

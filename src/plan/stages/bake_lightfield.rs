@@ -8,8 +8,10 @@ use crate::io::jobs::{Done, Shard, complete, is_finished, is_sealed_as, touch};
 use crate::io::json;
 use crate::io::provenance::hash_file;
 use crate::method::light_field_probes::bake::{LightFieldBakeParams, Seen, bounce, look};
+use crate::method::light_field_probes::field::{LightField, no_surfels};
 use crate::method::light_field_probes::probe::{Ambient, Surfels};
-use crate::method::light_field_probes::store::{LightField, LightFieldSet, files, no_surfels, octree_path, write_light};
+use crate::method::light_field_probes::shade::Shading;
+use crate::method::light_field_probes::store::{LightFieldSet, files, octree_path, write_light};
 use crate::plan::option::stage;
 use crate::plan::{Context, Outcome};
 use crate::probe::places::Places;
@@ -110,8 +112,7 @@ impl BakeLightfield {
         params: &LightFieldBakeParams,
         provenance: &Provenance,
     ) -> Result<()> {
-        let (low, high) = world.scene.geometry.bounds();
-        let far = 2.0 * low.distance(high).max(f32::MIN_POSITIVE);
+        let far = Shading::far(world);
         let probes = places.used();
         let read = |i: usize| Seen::read(&files(&self.output, i)[0], params.size as usize, provenance);
         let surfels = |i: usize| if places.is_blocked(i) { Ok(no_surfels()) } else { read(i).map(|seen| seen.surfels) };

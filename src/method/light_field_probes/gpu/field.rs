@@ -4,8 +4,8 @@ use crate::gpu::Gpu;
 use crate::gpu::kernel::FAR;
 use crate::gpu::spec::{StructLayout, layout};
 use crate::method::light_field_probes::LightFieldParams;
+use crate::method::light_field_probes::field::LightField;
 use crate::method::light_field_probes::octree::{LEAF, NO_PROBE};
-use crate::method::light_field_probes::store::LightField;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable, cast_slice};
 

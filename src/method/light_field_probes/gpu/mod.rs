@@ -3,8 +3,8 @@
 pub(crate) mod field;
 
 use super::LightFieldParams;
+use super::field::LightField;
 use super::shade::{BRANCHES, DIRECT, Shading};
-use super::store::LightField;
 use crate::Result;
 use crate::gpu::Gpu;
 use crate::gpu::camera::{CAMERA, GpuCamera};

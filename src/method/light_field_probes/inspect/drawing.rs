@@ -3,9 +3,10 @@
 use super::way::Way;
 use crate::io::canvas::{BACKGROUND, Canvas, Colour, INK, LINE};
 use crate::io::picture::scalar;
-use crate::method::light_field_probes::store::LightField;
+use crate::method::light_field_probes::field::LightField;
+use crate::method::light_field_probes::march::LocalRay;
 use crate::method::light_field_probes::trace::{Found, Step};
-use crate::probe::octahedral::{encode, within_octant};
+use crate::probe::octahedral::encode;
 use crate::probe::plan_picture::Plan;
 use crate::probe::skeleton::space::Space;
 use crate::transport::World;
@@ -190,16 +191,9 @@ fn draw_map(canvas: &mut Canvas, [x, y]: [usize; 2], field: &LightField, way: &W
 
 /// A ray from `o` relative to a probe along `d`, as lines on the probe's map in [0, 1]²: a straight one in each octant.
 fn lines(o: Vec3, d: Vec3, [from, to]: [f32; 2]) -> Vec<[Vec2; 2]> {
-    let mut cuts: Vec<f32> = (0..3).map(|axis| -o[axis] / d[axis]).filter(|t| *t > from && *t < to).collect();
-    cuts.extend([from, to]);
-    cuts.sort_unstable_by(f32::total_cmp);
-    let line = |t: &[f32]| {
-        let ends = [o + d * t[0], o + d * t[1]];
-        let signs = Vec3::ONE.copysign(ends[0] + ends[1]);
-        let is_line = ends.iter().all(|p| p.dot(signs) > 0.0);
-        is_line.then(|| ends.map(|p| (within_octant(p, signs) * 0.5 + 0.5).clamp(Vec2::ZERO, Vec2::ONE)))
-    };
-    cuts.windows(2).filter_map(line).collect()
+    let ray = LocalRay { o, d };
+    let (cuts, count) = ray.cuts([from, to]);
+    cuts[..count].windows(2).filter_map(|t| Some(ray.piece([t[0], t[1]])?.0)).collect()
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! A ray's way through the probes, beside what it meets in the scene.
 
 use crate::base::ray::Ray;
+use crate::method::light_field_probes::field::LightField;
 use crate::method::light_field_probes::march::{March, Search};
-use crate::method::light_field_probes::store::LightField;
 use crate::method::light_field_probes::trace::{Found, Step, follow};
 use crate::scene::Camera;
 use crate::transport::World;
