@@ -94,6 +94,12 @@ pub fn lat_long_from_direction(d: Vec3) -> Vec2 {
     Vec2::new(if u >= 1.0 { 0.0 } else { u }, d.y.clamp(-1.0, 1.0).acos() / PI)
 }
 
+/// The `i`-th of `n` directions spread evenly over the sphere (a Fibonacci spiral from +Y down).
+pub fn spread_over_sphere(i: u32, n: u32) -> Vec3 {
+    let v = (1.0 - 2.0 * (i as f32 + 0.5) / n as f32).acos() / PI;
+    direction_from_lat_long(Vec2::new((f64::from(i) * 0.618_033_988_749_894_9).fract() as f32, v))
+}
+
 /// A well-mixed 64-bit hash of a 64-bit key (SplitMix64's finaliser).
 pub fn hash64(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -86,7 +86,7 @@ pub struct Plan<'a> {
     /// Charts with a front and a back to bake.
     active: Vec<[bool; 2]>,
     /// Texel and whether its back is meant.
-    items: Vec<(u32, bool)>,
+    pub(super) items: Vec<(u32, bool)>,
 }
 
 /// One pass over all texels.
@@ -111,17 +111,24 @@ impl<'a> Pass<'a> {
 impl<'a> Plan<'a> {
     /// Cuts the charts, finds the solids, and leaves out the sides that nobody sees or no light reaches.
     pub fn new(world: &'a World, params: &LightMapParams, seed: u32) -> Result<Self> {
+        Self::of_sides(world, params, seed, false)
+    }
+
+    /// As [`Plan::new`], for light that is not known yet: backs count whether the scene's own lights reach them or not.
+    pub fn for_any_light(world: &'a World, atlas: AtlasParams) -> Result<Self> {
+        Self::of_sides(world, &LightMapParams { atlas, ..LightMapParams::default() }, 0, true)
+    }
+
+    fn of_sides(world: &'a World, params: &LightMapParams, seed: u32, any_light: bool) -> Result<Self> {
         if params.spp == 0 {
             return Err(Error::Request("--spp 0: expected at least 1".into()));
         }
         let scene = &world.scene;
-        let bsdf = |object: usize| &scene.materials[scene.geometry.objects[object].material as usize].bsdf;
-        let diffuse = |o: usize| bsdf(o).lobes().contains(Lobes::DIFFUSE) && !bsdf(o).is_transmissive();
-        let atlas = Atlas::build(&scene.geometry, &diffuse, &params.atlas)?;
+        let atlas = atlas_of(scene, &params.atlas)?;
         let texels = Texels::new(&scene.geometry, &atlas);
         let orientation = solids(scene);
         let mut plan = Self { world, params: *params, seed, atlas, texels, orientation, active: Vec::new(), items: Vec::new() };
-        plan.active = plan.active_sides();
+        plan.active = plan.active_sides(any_light);
         for back in [false, true] {
             let active = |&t: &u32| plan.active[plan.texels.chart[t as usize] as usize][back as usize];
             let list = (0..plan.texels.len() as u32).filter(active).map(|t| (t, back));
@@ -281,8 +288,8 @@ impl<'a> Plan<'a> {
     }
 
     /// Which sides of each chart are baked: not those that face into a solid, not the backs of one-sided materials,
-    /// and not backs that get no light at all from the first samples of their texels.
-    fn active_sides(&self) -> Vec<[bool; 2]> {
+    /// and not backs that get no light at all from the first samples of their texels, unless any light may come.
+    fn active_sides(&self, any_light: bool) -> Vec<[bool; 2]> {
         let mut range = vec![(usize::MAX, 0); self.atlas.charts.len()];
         for (i, &c) in self.texels.chart.iter().enumerate() {
             let r: &mut (usize, usize) = &mut range[c as usize];
@@ -311,7 +318,7 @@ impl<'a> Plan<'a> {
                         })
                     })
                 };
-                [seen(false), two_sided && seen(true) && lit()]
+                [seen(false), two_sided && seen(true) && (any_light || lit())]
             })
             .collect()
     }
@@ -328,6 +335,13 @@ impl Side {
         let n = (plan.atlas.size[0] * plan.atlas.size[1]) as usize;
         Self { pixels: vec![Rgb::ZERO; n], flags: vec![0; n] }
     }
+}
+
+/// The atlas of a scene's surfaces with a diffuse lobe. The same scene and parameters give the same atlas.
+pub fn atlas_of(scene: &Scene, params: &AtlasParams) -> Result<Atlas> {
+    let bsdf = |object: usize| &scene.materials[scene.geometry.objects[object].material as usize].bsdf;
+    let diffuse = |o: usize| bsdf(o).lobes().contains(Lobes::DIFFUSE) && !bsdf(o).is_transmissive();
+    Atlas::build(&scene.geometry, &diffuse, params)
 }
 
 /// The solids of a scene. Masked objects have holes and transmissive ones let light in: they are none.

@@ -8,6 +8,7 @@
 //! - [`solid`] and [`visible`]: samples inside or behind other geometry.
 //! - [`bake`]: the integral, in blocks that can be kept ([`parts`]) and taken up again.
 //! - [`fill`] and [`seam`]: gutters, texels without a value, and chart borders on smooth surfaces.
+//! - [`receivers`]: points of texels where others than the bake gather light.
 //! - [`lookup`]: the file, and a bilinear lookup for a triangle and its barycentrics.
 //!
 //! The diffuse layer of a pixel is `diffuse_out(view) · E_T / π` with the albedo texture at full resolution.
@@ -23,6 +24,7 @@ pub mod fill;
 pub mod lookup;
 pub mod pack;
 pub mod parts;
+pub mod receivers;
 pub mod seam;
 pub mod solid;
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub mod image_space_gather;
 pub mod light_field_probes;
 pub mod lightmap_rt;
 pub mod path_trace;
+pub mod radiance_probes;
 pub mod ulr;
 
 use crate::base::math::Rgb;
@@ -35,6 +36,7 @@ pub const METHODS: &[&Method] = &[
     &image_space_gather::METHOD,
     &lightmap_rt::METHOD,
     &light_field_probes::METHOD,
+    &radiance_probes::METHOD,
 ];
 
 /// A row of the table.

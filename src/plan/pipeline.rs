@@ -1,7 +1,7 @@
 //! From a scene to frames: the stages that lead to a method's frames, each reading what the ones before it write.
 
 use super::settings::Settings;
-use super::stages::{BakeLightfield, BakeLightmap, BakeProbes, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
+use super::stages::{BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Curvature, PlaceProbes, Qhmap, RenderPath, Resmap};
 use super::views::FrameList;
 use super::{Context, Outcome, Stage};
 use crate::method::{Method, Need};
@@ -25,6 +25,8 @@ pub struct Bakes {
     pub probes: PathBuf,
     /// Light field probes.
     pub lightfield: PathBuf,
+    /// Transport of radiance probes.
+    pub transport: PathBuf,
 }
 
 impl Bakes {
@@ -39,6 +41,16 @@ impl Bakes {
             lightmap: at("lightmap.exr"),
             probes: at("probes"),
             lightfield: at("lightfield"),
+            transport: at("transport"),
+        }
+    }
+
+    /// The folder of baked probes that a stage writes.
+    fn of(&self, stage: &str) -> &PathBuf {
+        match stage {
+            BakeLightfield::COMMAND => &self.lightfield,
+            BakeTransport::COMMAND => &self.transport,
+            _ => &self.probes,
         }
     }
 }
@@ -58,7 +70,7 @@ pub struct Pipeline {
 
 impl Pipeline {
     /// The stages that make `bakes`, in order.
-    pub fn bakes(&self, bakes: &Bakes) -> [Stage; 7] {
+    pub fn bakes(&self, bakes: &Bakes) -> [Stage; 8] {
         let (s, scene) = (&self.settings, || self.scene.clone());
         let for_path = !s.all_texels;
         [
@@ -116,6 +128,8 @@ impl Pipeline {
                 ..Default::default()
             }
             .into(),
+            BakeTransport { scene: scene(), probes: bakes.grid.clone(), output: bakes.transport.clone(), ..Default::default() }
+                .into(),
         ]
     }
 
@@ -127,10 +141,7 @@ impl Pipeline {
             frames: self.frames.clone(),
             size: self.settings.size,
             method: Some(method.name.into()),
-            probes: method
-                .reads
-                .probes
-                .map(|p| if p.stage == BakeLightfield::COMMAND { &bakes.lightfield } else { &bakes.probes }.clone()),
+            probes: method.reads.probes.map(|p| bakes.of(p.stage).clone()),
             lightmap: (method.reads.lightmap != Need::No).then(|| bakes.lightmap.clone()),
             curvature: (method.reads.curvature != Need::No).then(|| bakes.curvature.clone()),
             supersample: method.uses("supersample").then_some(self.settings.supersample),

@@ -1,7 +1,8 @@
 //! A stage of a pipeline: one of the subcommands that read files and write files.
 
 use super::stages::{
-    BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap, RenderPath, Resmap,
+    BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap, Relight,
+    RenderPath, Resmap,
 };
 use super::{Context, Outcome, overwrite};
 use crate::Result;
@@ -26,6 +27,10 @@ pub enum Stage {
     BakeProbes(BakeProbes),
     /// `bake-lightfield`
     BakeLightfield(BakeLightfield),
+    /// `bake-transport`
+    BakeTransport(BakeTransport),
+    /// `relight`
+    Relight(Relight),
     /// `render-path`
     RenderPath(RenderPath),
     /// `compare`
@@ -35,7 +40,7 @@ pub enum Stage {
 }
 
 /// The stages that bake, in the order in which they run.
-pub const BAKES: [&str; 7] = [
+pub const BAKES: [&str; 8] = [
     PlaceProbes::COMMAND,
     Resmap::COMMAND,
     Qhmap::COMMAND,
@@ -43,6 +48,7 @@ pub const BAKES: [&str; 7] = [
     BakeLightmap::COMMAND,
     BakeProbes::COMMAND,
     BakeLightfield::COMMAND,
+    BakeTransport::COMMAND,
 ];
 
 /// Does the same with whichever stage it is.
@@ -56,6 +62,8 @@ macro_rules! with {
             Stage::BakeLightmap($s) => $what,
             Stage::BakeProbes($s) => $what,
             Stage::BakeLightfield($s) => $what,
+            Stage::BakeTransport($s) => $what,
+            Stage::Relight($s) => $what,
             Stage::RenderPath($s) => $what,
             Stage::Compare($s) => $what,
             Stage::InspectLightfield($s) => $what,
@@ -70,7 +78,20 @@ macro_rules! from {
         }
     })+ };
 }
-from!(PlaceProbes, Resmap, Qhmap, Curvature, BakeLightmap, BakeProbes, BakeLightfield, RenderPath, Compare, InspectLightfield);
+from!(
+    PlaceProbes,
+    Resmap,
+    Qhmap,
+    Relight,
+    Curvature,
+    BakeLightmap,
+    BakeProbes,
+    BakeLightfield,
+    BakeTransport,
+    RenderPath,
+    Compare,
+    InspectLightfield
+);
 
 impl Stage {
     /// The subcommand.
@@ -86,6 +107,8 @@ impl Stage {
             Self::BakeLightmap(s) => of(s, BakeLightmap::COMMAND),
             Self::BakeProbes(s) => of(s, BakeProbes::COMMAND),
             Self::BakeLightfield(s) => of(s, BakeLightfield::COMMAND),
+            Self::BakeTransport(s) => of(s, BakeTransport::COMMAND),
+            Self::Relight(s) => of(s, Relight::COMMAND),
             Self::RenderPath(s) => of(s, RenderPath::COMMAND),
             Self::Compare(s) => of(s, Compare::COMMAND),
             Self::InspectLightfield(s) => of(s, InspectLightfield::COMMAND),
@@ -113,6 +136,8 @@ impl Stage {
             Self::PlaceProbes(_) | Self::Curvature(_) | Self::BakeLightmap(_) => vec![],
             Self::Resmap(s) => vec![&s.probes],
             Self::BakeLightfield(s) => vec![&s.probes],
+            Self::BakeTransport(s) => vec![&s.probes],
+            Self::Relight(s) => vec![&s.probes],
             Self::InspectLightfield(s) => vec![&s.probes],
             Self::Qhmap(s) => vec![&s.resmap],
             Self::BakeProbes(s) => [&s.probes, &s.qhmap].into_iter().chain(&s.lightmap).chain(&s.curvature).collect(),
@@ -129,6 +154,8 @@ impl Stage {
             Self::Curvature(s) => vec![&s.scene],
             Self::BakeLightmap(s) => vec![&s.scene],
             Self::BakeLightfield(s) => vec![&s.scene],
+            Self::BakeTransport(s) => vec![&s.scene],
+            Self::Relight(s) => vec![&s.scene],
             Self::BakeProbes(s) => [&s.scene].into_iter().chain(&s.for_path).collect(),
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),

@@ -22,3 +22,4 @@ pub mod select;
 pub mod set;
 pub mod skeleton;
 pub mod store;
+pub mod support;

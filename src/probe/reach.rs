@@ -5,11 +5,11 @@
 //! tails of the seen points' distribution are trimmed, so that a view out of a window does not draw the grid after it.
 
 use super::placement::ProbeGrid;
-use crate::base::math::direction_from_lat_long;
+use crate::base::math::spread_over_sphere;
 use crate::base::ray::Ray;
 use crate::transport::World;
 use crate::{Error, Result};
-use glam::{IVec3, UVec3, Vec2, Vec3};
+use glam::{IVec3, UVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +40,7 @@ pub fn reach(world: &World, cameras: &[Vec3], params: &ReachParams) -> Result<(V
     let seen: Vec<Vec3> = chosen
         .par_iter()
         .flat_map_iter(|&o| {
-            let rays = (0..params.rays).map(move |i| Ray::new(o, spread(i, params.rays)));
+            let rays = (0..params.rays).map(move |i| Ray::new(o, spread_over_sphere(i, params.rays)));
             rays.filter_map(|ray| world.closest(&ray).map(|hit| ray.at(hit.t)))
         })
         .collect();
@@ -65,12 +65,6 @@ pub fn reach(world: &World, cameras: &[Vec3], params: &ReachParams) -> Result<(V
         upper = upper.min(path_upper + params.margin);
     }
     Ok((lower.min(path_lower), upper.max(path_upper)))
-}
-
-/// Unit directions spread evenly over the sphere (a Fibonacci lattice).
-fn spread(i: u32, n: u32) -> Vec3 {
-    let v = (1.0 - 2.0 * (i as f32 + 0.5) / n as f32).acos() / std::f32::consts::PI;
-    direction_from_lat_long(Vec2::new((f64::from(i) * 0.618_033_988_749_894_9).fract() as f32, v))
 }
 
 /// Probes of the grid that are inside objects or behind walls: those which no chain of free lines of sight between near

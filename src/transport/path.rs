@@ -43,6 +43,9 @@ impl Default for PathParams {
 }
 
 impl PathParams {
+    /// Light straight from emitters alone.
+    pub const DIRECT: Self = Self { max_depth: 1, rr_depth: u32::MAX };
+
     /// What the scene's integrator says, with the defaults for what it does not.
     pub fn of(scene: &Scene) -> Self {
         let default = Self::default();

@@ -59,6 +59,8 @@ pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
         ("place-probes", &["device"][..]),
         ("resmap", &["seed"]),
         ("bake-lightfield", &["device"]),
+        ("bake-transport", &["device", "seed"]),
+        ("relight", &["device"]),
         ("qhmap", &[&["device", "seed"][..], &SCENE].concat()),
         ("curvature", &["device", "seed"]),
         ("compare", &[&["device", "seed"][..], &SCENE].concat()),

@@ -4,6 +4,7 @@
 mod bake_lightfield;
 mod bake_lightmap;
 mod bake_probes;
+mod bake_transport;
 mod common;
 mod compare;
 mod curvature;
@@ -14,6 +15,7 @@ mod inspect_lightfield;
 mod place_probes;
 mod preset;
 mod qhmap;
+mod relight;
 mod render_path;
 mod resmap;
 mod run;
@@ -56,6 +58,8 @@ enum Command {
     BakeProbes(bake_probes::Args),
     BakeLightmap(bake_lightmap::Args),
     BakeLightfield(bake_lightfield::Args),
+    BakeTransport(bake_transport::Args),
+    Relight(relight::Args),
     RenderPath(render_path::Args),
     Compare(compare::Args),
     InspectLightfield(inspect_lightfield::Args),
@@ -114,6 +118,8 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::BakeProbes(args) => args.stage().into(),
         Command::BakeLightmap(args) => args.stage().into(),
         Command::BakeLightfield(args) => args.stage().into(),
+        Command::BakeTransport(args) => args.stage().into(),
+        Command::Relight(args) => args.stage().into(),
         Command::RenderPath(args) => args.stage().into(),
         Command::Compare(args) => args.stage().into(),
         Command::InspectLightfield(args) => args.stage().into(),
@@ -135,7 +141,8 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
 mod tests {
     use super::*;
     use reprobe::plan::stages::{
-        BakeLightfield, BakeLightmap, BakeProbes, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap, RenderPath, Resmap,
+        BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap,
+        Relight, RenderPath, Resmap,
     };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -149,7 +156,9 @@ mod tests {
             (Curvature::COMMAND, Curvature::OPTIONS),
             (BakeLightmap::COMMAND, BakeLightmap::OPTIONS),
             (BakeLightfield::COMMAND, BakeLightfield::OPTIONS),
+            (BakeTransport::COMMAND, BakeTransport::OPTIONS),
             (BakeProbes::COMMAND, BakeProbes::OPTIONS),
+            (Relight::COMMAND, Relight::OPTIONS),
             (RenderPath::COMMAND, RenderPath::OPTIONS),
             (Compare::COMMAND, Compare::OPTIONS),
             (InspectLightfield::COMMAND, InspectLightfield::OPTIONS),

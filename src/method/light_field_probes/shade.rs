@@ -5,8 +5,8 @@ use super::field::LightField;
 use super::lobe::along_lobes;
 use crate::base::math::{Rgb, hash_words};
 use crate::material::bsdf::{Lobes, Query};
-use crate::transport::path::{PathParams, scattered};
-use crate::transport::{Sampler, World};
+use crate::transport::World;
+use crate::view::direct::direct;
 use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -30,9 +30,6 @@ pub struct Shading<'a> {
 /// Branches of a pixel's random stream: direct light of either layer, and rays along the glossy lobes.
 pub(crate) const BRANCHES: [u32; 3] = [1, 2, 3];
 
-/// Direct light alone.
-pub(crate) const DIRECT: PathParams = PathParams { max_depth: 1, rr_depth: u32::MAX };
-
 impl Shading<'_> {
     /// The length of rays in a scene.
     pub fn far(world: &World) -> f32 {
@@ -51,7 +48,7 @@ impl Shading<'_> {
             }
             let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
             let around = self.field.irradiance(surface.p, p.normal);
-            self.direct(p, query, stream, BRANCHES[0]) + albedo * around * FRAC_1_PI
+            self.direct(p, query, hash_words(&[stream, BRANCHES[0]])) + albedo * around * FRAC_1_PI
         })
     }
 
@@ -63,8 +60,12 @@ impl Shading<'_> {
             }
             let rays = hash_words(&[stream, BRANCHES[2]]);
             let along = along_lobes((self.world, self.field), (&p.surface, p.wo), (&self.params, self.far), rays);
-            self.direct(p, GLOSSY, stream, BRANCHES[1]) + along
+            self.direct(p, GLOSSY, hash_words(&[stream, BRANCHES[1]])) + along
         })
+    }
+
+    fn direct(&self, p: &Pixel, query: Query, stream: u32) -> Rgb {
+        direct(self.world, p, query, self.params.direct_samples, stream)
     }
 
     fn layer(&self, view: &GBuffer, of: impl Fn(&Pixel, u32) -> Rgb + Sync) -> Vec<Rgb> {
@@ -73,15 +74,5 @@ impl Shading<'_> {
             pixel.as_ref().map_or(Rgb::ZERO, |p| of(p, stream))
         };
         view.pixels.par_iter().enumerate().with_min_len(view.size()[0]).map(pixel).collect()
-    }
-
-    /// Light straight from emitters.
-    fn direct(&self, p: &Pixel, query: Query, stream: u32, branch: u32) -> Rgb {
-        let count = self.params.direct_samples;
-        let sample = |s| {
-            let mut sampler = Sampler::new(hash_words(&[stream, branch]), s);
-            scattered(self.world, &p.surface, p.wo, query, None, &DIRECT, &mut sampler)
-        };
-        (0..count).map(sample).sum::<Rgb>() / count.max(1) as f32
     }
 }

@@ -161,7 +161,7 @@ fn folders(of: &Evaluate, variant: &Variant) -> Bakes {
     let common = Bakes::within(&root);
     let within = |stages: &[&str]| own(variant, stages).map(|name| Bakes::within(&root.join(name)));
     let given = |own: Option<PathBuf>, given: &Option<PathBuf>, common: PathBuf| own.or(given.clone()).unwrap_or(common);
-    let [place, resmap, qhmap, curvature, lightmap, probes, lightfield] = BAKES;
+    let [place, resmap, qhmap, curvature, lightmap, probes, lightfield, transport] = BAKES;
     Bakes {
         grid: within(&[place]).map_or(common.grid, |b| b.grid),
         resmap: within(&[place, resmap]).map_or(common.resmap, |b| b.resmap),
@@ -170,6 +170,7 @@ fn folders(of: &Evaluate, variant: &Variant) -> Bakes {
         lightmap: given(within(&[lightmap]).map(|b| b.lightmap), &of.lightmap, common.lightmap),
         probes: given(within(&[place, resmap, qhmap, curvature, lightmap, probes]).map(|b| b.probes), &of.probes, common.probes),
         lightfield: within(&[place, lightfield]).map_or(common.lightfield, |b| b.lightfield),
+        transport: within(&[place, transport]).map_or(common.transport, |b| b.transport),
     }
 }
 

@@ -4,7 +4,7 @@ pub(crate) mod field;
 
 use super::LightFieldParams;
 use super::field::LightField;
-use super::shade::{BRANCHES, DIRECT, Shading};
+use super::shade::{BRANCHES, Shading};
 use crate::Result;
 use crate::gpu::Gpu;
 use crate::gpu::camera::{CAMERA, GpuCamera};
@@ -21,6 +21,7 @@ use crate::material::bsdf::{Lobes, Query};
 use crate::scene::Camera;
 use crate::transport::World;
 use crate::transport::follow::PathStart;
+use crate::transport::path::PathParams;
 use crate::view::gbuffer::GLOSSY;
 use bytemuck::{Pod, Zeroable};
 use field::{FIELD, Field, GpuField};
@@ -197,7 +198,7 @@ impl Layers {
     fn new(scene: Arc<GpuScene>, field: GpuField, direct_samples: u32) -> Result<Self> {
         let place = |k: u32| Place { branch: Some(BRANCHES[k as usize]), first_set: 0 };
         let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
-        let diffuse = Samples::new(scene.clone(), &DIRECT, Purpose::Scattering(query), place(DIFFUSE_LIGHT))?;
+        let diffuse = Samples::new(scene.clone(), &PathParams::DIRECT, Purpose::Scattering(query), place(DIFFUSE_LIGHT))?;
         let glossy = diffuse.half(GLOSSY.lobes, place(GLOSSY_LIGHT));
         let gpu = &scene.gpu;
         Ok(Self {

@@ -1,0 +1,116 @@
+//! A frame's light: direct light at the receivers, and what comes of it by way of the probes (§4.2).
+
+use super::operator::Transport;
+use super::params::RadianceProbeParams;
+use crate::base::clock::Clock;
+use crate::base::math::{Rgb, hash_words};
+use crate::base::ray::Hit;
+use crate::lightmap::LightMap;
+use crate::lightmap::lookup::sides;
+use crate::lightmap::receivers::{POINTS, Receiver, spread};
+use crate::material::Surface;
+use crate::material::bsdf::warp::cosine_hemisphere;
+use crate::transport::path::{PathParams, transmitted_irradiance};
+use crate::transport::{Sampler, World};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::FRAC_1_PI;
+
+/// Light at the receivers.
+pub struct Light {
+    /// E_T straight from emitters.
+    pub direct: Vec<Rgb>,
+    /// What comes by way of the probes, as many numbers a receiver as it keeps.
+    pub indirect: Vec<Rgb>,
+}
+
+/// The surface at a point of a receiver.
+pub fn surface(world: &World, receiver: &Receiver, point: usize) -> Surface {
+    let p = receiver.points[point % POINTS];
+    world.surface(&Hit { t: 0.0, triangle: p.triangle, u: p.barycentric.x, v: p.barycentric.y })
+}
+
+/// E_T that emitters send to each receiver. The random numbers of a receiver are the same in every frame, so that light which stays where it
+/// is does not flicker.
+pub fn direct(world: &World, receivers: &[Receiver], samples: u32, seed: u32) -> Vec<Rgb> {
+    let of = |r: &Receiver| {
+        let stream = hash_words(&[seed, r.pixel, u32::from(r.back)]);
+        let sample = |i: u32| {
+            let at = surface(world, r, i as usize);
+            transmitted_irradiance(world, &at, r.back, None, &PathParams::DIRECT, &mut Sampler::new(stream, i))
+        };
+        (0..samples).map(sample).sum::<Rgb>() / samples as f32
+    };
+    receivers.par_iter().with_min_len(64).map(of).collect()
+}
+
+/// What of E_T each receiver sends on as diffuse radiance: the mean over directions of `diffuse_out`, over π.
+pub fn reflectances(world: &World, receivers: &[Receiver]) -> Vec<Rgb> {
+    let of = |r: &Receiver| {
+        let side = if r.back { -1.0 } else { 1.0 };
+        let out = |k: usize| {
+            let at = surface(world, r, k);
+            let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / POINTS as f32, (0.618 * k as f32 + 0.3).fract()));
+            let bsdf = &world.scene.materials[at.material as usize].bsdf;
+            bsdf.diffuse_out(&at, Vec3::new(d.x, d.y, d.z * side))
+        };
+        (0..POINTS).map(out).sum::<Rgb>() * (FRAC_1_PI / POINTS as f32)
+    };
+    receivers.par_iter().with_min_len(64).map(of).collect()
+}
+
+/// All light of a frame of `world`; passes are timed as the paper does (Table 2).
+pub fn light(
+    transport: &Transport,
+    world: &World,
+    reflectance: &[Rgb],
+    params: &RadianceProbeParams,
+    seed: u32,
+    clock: &mut Clock,
+) -> Light {
+    let direct = direct(world, &transport.receivers, params.map_samples, seed);
+    clock.lap("scene relight");
+    let rows = transport.params.receiver.rows();
+    let mut indirect = vec![Rgb::ZERO; direct.len() * rows];
+    for _ in 0..params.bounces {
+        let radiance = radiance(&direct, &indirect, rows, reflectance);
+        let lambda = transport.probe_radiance(&radiance);
+        clock.lap("probe relight");
+        indirect = transport.receive(&lambda);
+        clock.lap("receivers");
+    }
+    Light { direct, indirect }
+}
+
+/// E_T of receivers that keep irradiance, from emitters and by way of the probes.
+pub fn total(light: &Light) -> Vec<Rgb> {
+    light.direct.iter().zip(&light.indirect).map(|(&d, i)| d + i.max(Rgb::ZERO)).collect()
+}
+
+/// Diffuse radiance that receivers send out.
+fn radiance(direct: &[Rgb], indirect: &[Rgb], rows: usize, reflectance: &[Rgb]) -> Vec<Rgb> {
+    direct
+        .par_iter()
+        .zip(indirect.par_chunks_exact(rows))
+        .zip(reflectance)
+        .map(|((d, i), &r)| (*d + i[0].max(Rgb::ZERO)) * r)
+        .collect()
+}
+
+/// A light map of one number a receiver.
+pub fn as_light_map(transport: &Transport, world: &World, values: &[Rgb]) -> LightMap {
+    let pixels = (transport.atlas.size[0] * transport.atlas.size[1]) as usize;
+    let side = |back: bool| {
+        let (mut image, mut valid) = (vec![Rgb::ZERO; pixels], vec![false; pixels]);
+        for (r, value) in transport.receivers.iter().zip(values).filter(|(r, _)| r.back == back) {
+            (image[r.pixel as usize], valid[r.pixel as usize]) = (value.max(Rgb::ZERO), true);
+        }
+        let any = valid.contains(&true);
+        if any {
+            spread(&world.scene.geometry, &transport.atlas, &mut image, &valid);
+        }
+        any.then_some(image)
+    };
+    let front = side(false).unwrap_or_else(|| vec![Rgb::ZERO; pixels]);
+    sides(&world.scene.geometry, &transport.atlas, front, side(true))
+}

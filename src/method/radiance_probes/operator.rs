@@ -1,0 +1,100 @@
+//! The operator in memory, and what it makes of the probes' radiance: cluster projection and receiver reconstruction (§4.2).
+
+use super::compress::Cluster;
+use super::params::TransportParams;
+use super::relight::RelightRays;
+use crate::base::math::Rgb;
+use crate::lightmap::Atlas;
+use crate::lightmap::receivers::Receiver;
+use glam::Vec3;
+use half::slice::HalfFloatSliceExt;
+use rayon::prelude::*;
+
+/// Lanes of a sum.
+const LANES: usize = 8;
+
+/// All that `bake-transport` wrote.
+pub struct Transport {
+    /// How it was baked.
+    pub params: TransportParams,
+    /// Where the probes stand, metres.
+    pub probes: Vec<Vec3>,
+    /// Radius of their support, metres.
+    pub radius: f32,
+    /// Where receivers lie.
+    pub atlas: Atlas,
+    /// The receivers.
+    pub receivers: Vec<Receiver>,
+    /// Directions of relight rays.
+    pub rays: RelightRays,
+    /// The receiver that each of them meets, probe by probe.
+    pub hits: Vec<u32>,
+    /// The receivers' rows.
+    pub clusters: Vec<Cluster>,
+}
+
+impl Transport {
+    /// λ, from what the receivers send out (diffuse radiance).
+    pub fn probe_radiance(&self, radiance: &[Rgb]) -> Vec<Rgb> {
+        self.rays.project(&self.hits, radiance)
+    }
+
+    /// What the receivers get by way of the probes: `receiver.rows()` numbers each (Eq. 6).
+    pub fn receive(&self, lambda: &[Rgb]) -> Vec<Rgb> {
+        let rows = self.params.receiver.rows();
+        let terms = self.params.terms();
+        let all: Vec<Vec<Rgb>> = self.clusters.par_iter().map(|cluster| cluster.receive(lambda, terms)).collect();
+        let mut light = vec![Rgb::ZERO; self.receivers.len() * rows];
+        for (cluster, values) in self.clusters.iter().zip(&all) {
+            for (&r, values) in cluster.receivers.iter().zip(values.chunks_exact(rows)) {
+                light[r as usize * rows..][..rows].copy_from_slice(values);
+            }
+        }
+        light
+    }
+
+    /// Bytes of receivers, relight rays and the operator.
+    pub fn bytes(&self) -> usize {
+        let halves = |c: &Cluster| 2 * (c.projection.len() + c.reconstruction.len()) + 4 * (c.receivers.len() + c.probes.len());
+        let clusters: usize = self.clusters.iter().map(halves).sum();
+        clusters + 4 * self.hits.len() + self.receivers.len() * size_of::<Receiver>()
+    }
+}
+
+impl Cluster {
+    /// Light of the cluster's receivers (as many numbers each as they keep) under `lambda` of all probes.
+    pub fn receive(&self, lambda: &[Rgb], terms: usize) -> Vec<Rgb> {
+        let numbers = self.reconstruction.len().checked_div(self.rank);
+        let Some(numbers) = numbers else { return vec![Rgb::ZERO; self.receivers.len() * 4] };
+        // A channel after the other, so that sums run along them.
+        let mine = || self.probes.iter().flat_map(|&p| &lambda[p as usize * terms..][..terms]);
+        let channels: [Vec<f32>; 3] = std::array::from_fn(|c| mine().map(|l| l[c]).collect());
+        let width = channels[0].len();
+        let mut row = vec![0.0; width];
+        let mut space = vec![Rgb::ZERO; self.rank];
+        for (k, light) in space.iter_mut().enumerate() {
+            self.projection[k * width..][..width].convert_to_f32_slice(&mut row);
+            *light = Rgb::from_array([0, 1, 2].map(|c| dot(&row, &channels[c])));
+        }
+        let mut factors = vec![0.0; self.rank];
+        let number = |i: usize| {
+            let factors: &mut [f32] = &mut factors;
+            self.reconstruction[i * self.rank..][..self.rank].convert_to_f32_slice(factors);
+            factors.iter().zip(&space).map(|(&u, &l)| l * u).sum()
+        };
+        (0..numbers).map(number).collect()
+    }
+}
+
+/// Σ a b, in lanes of a fixed order.
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0; LANES];
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f32 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a.zip(b) {
+        for k in 0..LANES {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f32>() + rest
+}

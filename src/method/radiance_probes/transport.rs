@@ -1,0 +1,205 @@
+//! Local transport: how a receiver's light follows from the radiance of the probes around it (§3.2, §3.3).
+
+use super::compress::mean_square;
+use super::harmonics::{Harmonics, MAX_TERMS};
+use super::seen::Ground;
+use crate::base::math::Basis;
+use crate::lightmap::receivers::POINTS;
+use crate::lightmap::visible::facing;
+use crate::material::Surface;
+use crate::probe::support::weight;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::f32::consts::{PI, TAU};
+
+/// Rows that say how large rows are.
+const SCALE_ROWS: usize = 512;
+
+/// How the probes' radiance is interpolated to a receiver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interpolation {
+    /// At the surfaces that receiver and probe both see (Eq. 2).
+    #[default]
+    Visible,
+    /// In the receiver's own directions, whatever probes see there (Eq. 1).
+    Spatial,
+    /// What Arikan et al. 2005 part, without the flaws of an implementation (Fig. 8): near surfaces as with `visible`, all others as with
+    /// `spatial`, but where near ones stand before them. *Reading*: near is what lies within half the radius of the probes' support.
+    Decomposed,
+}
+
+/// What of its light a receiver keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kept {
+    /// ∫ T_in(ω) L(ω) cos θ dω, the light map's quantity (Eq. 7).
+    #[default]
+    Irradiance,
+    /// The four spherical harmonics of the incident radiance up to order 1, in the world's frame (Eq. 8).
+    Sh1,
+}
+
+impl Kept {
+    /// Numbers a receiver.
+    pub fn rows(self) -> usize {
+        match self {
+            Self::Irradiance => 1,
+            Self::Sh1 => 4,
+        }
+    }
+}
+
+/// The names of an enumeration's values, both ways.
+macro_rules! names {
+    ($type:ident { $($value:ident $name:literal),+ }) => {
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str(match self { $(Self::$value => $name),+ })
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = String;
+
+            fn from_str(text: &str) -> Result<Self, String> {
+                match text {
+                    $($name => Ok(Self::$value),)+
+                    _ => Err(format!("\"{text}\": expected one of {}", [$($name),+].join(", "))),
+                }
+            }
+        }
+    };
+}
+names!(Kept { Irradiance "irradiance", Sh1 "sh1" });
+names!(Interpolation { Visible "visible", Spatial "spatial", Decomposed "decomposed" });
+
+/// Directions over a hemisphere about +z, the same ones for every receiver: neighbours then differ by what they see alone, and their rows
+/// compress well (*Ours*).
+pub struct Gather {
+    directions: Vec<Vec3>,
+    kept: Kept,
+    interpolation: Interpolation,
+    harmonics: Harmonics,
+}
+
+/// A receiver's row of the operator, dense over the probes that take part.
+pub struct Row {
+    /// Probes whose support holds the receiver.
+    pub probes: Vec<u32>,
+    /// For each number that the receiver keeps, each of these probes and each of its harmonics: α or β.
+    pub values: Vec<f32>,
+}
+
+impl Gather {
+    /// `rays` a receiver, probes of `order`.
+    pub fn new(rays: u32, order: u32, kept: Kept, interpolation: Interpolation) -> Self {
+        let direction = |i: u32| {
+            let u = Vec2::new((i as f32 + 0.5) / rays as f32, ((f64::from(i) + 0.5) * 0.618_033_988_749_895).fract() as f32);
+            let (sin_phi, cos_phi) = (u.y * TAU).sin_cos();
+            let z = match kept {
+                Kept::Irradiance => (1.0 - u.x).sqrt(),
+                Kept::Sh1 => 1.0 - u.x,
+            };
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            Vec3::new(r * cos_phi, r * sin_phi, z)
+        };
+        Self { directions: (0..rays).map(direction).collect(), kept, interpolation, harmonics: Harmonics::new(order) }
+    }
+
+    /// Harmonics of a probe.
+    pub fn terms(&self) -> usize {
+        self.harmonics.terms()
+    }
+
+    /// The mean square of receivers' rows, by a sample of them: what errors of compression are measured by.
+    pub fn scale(&self, ground: &Ground) -> f64 {
+        let count = ground.receivers.list.len();
+        let chosen: Vec<u32> = (0..count).step_by(count.div_ceil(SCALE_ROWS).max(1)).map(|r| r as u32).collect();
+        mean_square(&chosen.par_iter().map(|&r| self.row(ground, r)).collect::<Vec<_>>())
+    }
+
+    /// The row of a receiver (Eq. 4, 7, 8): over its rays the mean of what it measures times w_i V_i Y_j(ψ_i) / Σ_k w_k V_k.
+    pub fn row(&self, ground: &Ground, receiver: u32) -> Row {
+        let surfaces = std::array::from_fn::<_, POINTS, _>(|k| ground.receivers.surface(ground.world, receiver, k));
+        let x = surfaces[0].p;
+        let reach = |p: Vec3| weight(x.distance(p) / ground.radius);
+        let support: Vec<(u32, f32)> =
+            ground.probes.iter().enumerate().map(|(i, &p)| (i as u32, reach(p))).filter(|(_, w)| *w > 0.0).collect();
+        let (terms, kinds) = (self.terms(), self.kept.rows());
+        let mut values = vec![0.0; kinds * support.len() * terms];
+        let back = ground.receivers.list[receiver as usize].back;
+        let bsdf = &ground.world.scene.materials[surfaces[0].material as usize].bsdf;
+        let mut y = [0.0; MAX_TERMS];
+        let mut parts: Vec<Part> = Vec::with_capacity(support.len());
+        for (k, &local) in self.directions.iter().enumerate() {
+            let surface = &surfaces[k % POINTS];
+            let normal = surface.frame.n * if back { -1.0 } else { 1.0 };
+            let d = Basis::from_normal(normal).to_world(local);
+            if d.dot(facing(surface, back)) <= 0.0 {
+                continue;
+            }
+            parts.clear();
+            self.parts(ground, surface, d, &support, &mut parts);
+            let sum: f32 = parts.iter().map(|p| p.weight).sum();
+            if sum <= 0.0 {
+                continue;
+            }
+            let mut measure = [0.0; 4];
+            match self.kept {
+                Kept::Irradiance => measure[0] = PI * bsdf.diffuse_in(surface, surface.frame.to_local(d)),
+                Kept::Sh1 => measure = first_four(d).map(|y| TAU * y),
+            }
+            let share = 1.0 / (sum * self.directions.len() as f32);
+            for part in &parts {
+                self.harmonics.evaluate(part.towards, &mut y);
+                for (row, m) in measure[..kinds].iter().enumerate() {
+                    let factor = m * part.weight * share;
+                    let at = (row * support.len() + part.slot) * terms;
+                    for (value, y) in values[at..at + terms].iter_mut().zip(&y) {
+                        *value += factor * y;
+                    }
+                }
+            }
+        }
+        Row { probes: support.iter().map(|s| s.0).collect(), values }
+    }
+
+    /// What the probes of a support have to say of the ray from `surface` along `d`.
+    fn parts(&self, ground: &Ground, surface: &Surface, d: Vec3, support: &[(u32, f32)], parts: &mut Vec<Part>) {
+        let plain = |parts: &mut Vec<Part>| {
+            parts.extend(support.iter().enumerate().map(|(slot, &(_, weight))| Part { slot, weight, towards: d }));
+        };
+        if self.interpolation == Interpolation::Spatial {
+            return plain(parts);
+        }
+        let Some(hit) = ground.world.intersect(&surface.spawn(d)) else { return };
+        if self.interpolation == Interpolation::Decomposed && hit.t > 0.5 * ground.radius {
+            return plain(parts);
+        }
+        let Some(seen) = ground.receivers.at(&hit, -d).map(|r| ground.seen(r)) else { return };
+        parts.extend(support.iter().enumerate().filter(|(_, (i, _))| seen[*i as usize] > 0).filter_map(
+            |(slot, &(i, weight))| {
+                let towards = (hit.p - ground.probes[i as usize]).try_normalize()?;
+                Some(Part { slot, weight: weight * f32::from(seen[i as usize]), towards })
+            },
+        ));
+    }
+}
+
+/// A probe's part in the light along a ray.
+struct Part {
+    /// Place of the probe in the support.
+    slot: usize,
+    /// w_i V_i.
+    weight: f32,
+    /// ψ_i.
+    towards: Vec3,
+}
+
+/// The harmonics up to order 1.
+pub fn first_four(d: Vec3) -> [f32; 4] {
+    let (y0, y1) = ((0.25 / PI).sqrt(), (0.75 / PI).sqrt());
+    [y0, y1 * d.y, y1 * d.z, y1 * d.x]
+}

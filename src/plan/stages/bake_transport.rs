@@ -1,0 +1,184 @@
+//! `bake-transport`.
+
+use crate::base::clock::seconds;
+use crate::base::named::Parameters;
+use crate::io::Provenance;
+use crate::io::jobs::{Done, Shard, complete, is_finished, is_sealed_as, touch};
+use crate::io::json;
+use crate::io::provenance::hash_file;
+use crate::lightmap::{AtlasParams, Plan};
+use crate::method::radiance_probes::cluster::groups;
+use crate::method::radiance_probes::compress::{CompressParams, compress};
+use crate::method::radiance_probes::params::TransportParams;
+use crate::method::radiance_probes::relight::RelightRays;
+use crate::method::radiance_probes::seen::Ground;
+use crate::method::radiance_probes::store::{TransportSet, encode_clusters, encode_receivers, encode_relight, files, positions};
+use crate::method::radiance_probes::transport::{Interpolation, Kept, Row};
+use crate::plan::option::{stage, text};
+use crate::plan::{Context, Outcome};
+use crate::probe::places::Places;
+use crate::probe::set::{ProbeSet, numbered};
+use crate::{Error, Result};
+use glam::Vec3;
+use rayon::prelude::*;
+use serde_json::json;
+use std::path::PathBuf;
+
+text!(Kept, Interpolation);
+
+stage! {
+    /// Bakes the transport of radiance probes.
+    BakeTransport "bake-transport"
+    {
+        /// The scene.
+        scene,
+    }
+    {
+        /// The probes.
+        "--probes" probes: PathBuf,
+        /// Order of the probes' spherical harmonics.
+        "--sh-order" sh_order: Option<u32>,
+        /// What a receiver keeps of its light.
+        "--receiver" receiver: Option<Kept>,
+        /// How the probes' radiance comes to it.
+        "--interpolation" interpolation: Option<Interpolation>,
+        /// About how many texels the receivers are.
+        "--texels" texels: Option<u32>,
+        /// Edge of a texel, metres, in place of the above.
+        "--texel" texel: Option<f32>,
+        /// Rays over a receiver's hemisphere.
+        "--rays" rays: Option<u32>,
+        /// Rays by which light comes to a probe.
+        "--relight-rays" relight_rays: Option<u32>,
+        /// Radius of a probe's support, metres.
+        "--radius" radius: Option<f32>,
+        /// Relative error of the compressed operator.
+        "--error" error: Option<f32>,
+        /// Most coefficients a receiver.
+        "--most-terms" most_terms: Option<u32>,
+        /// Bake this shard's receivers only.
+        "--shard" shard: Option<Shard>,
+        /// Folder for the operator.
+        "--output" output: PathBuf,
+    }
+}
+
+impl BakeTransport {
+    fn params(&self) -> Result<TransportParams> {
+        if self.texel.is_some() && self.texels.is_some() {
+            return Err(Error::Request("--texel, --texels: expected one of them".into()));
+        }
+        let base = TransportParams::default();
+        let receiver = self.receiver.unwrap_or(base.receiver);
+        let order = if receiver == Kept::Sh1 { 4 } else { base.sh_order };
+        let compress = CompressParams {
+            error: self.error.unwrap_or(base.compress.error),
+            most_terms: self.most_terms.unwrap_or(base.compress.most_terms),
+            ..base.compress
+        };
+        let params = TransportParams {
+            sh_order: self.sh_order.unwrap_or(order),
+            receiver,
+            interpolation: self.interpolation.unwrap_or(base.interpolation),
+            atlas: AtlasParams { texel: self.texel, budget: self.texels.unwrap_or(base.atlas.budget) },
+            rays: self.rays.unwrap_or(base.rays),
+            relight_rays: self.relight_rays.unwrap_or(base.relight_rays),
+            radius: self.radius.or(base.radius),
+            compress,
+        };
+        params.validate()?;
+        Ok(params)
+    }
+
+    /// Refuses options that are out of range.
+    pub fn check(&self) -> Result<()> {
+        self.params().map(|_| ())
+    }
+
+    /// Reads, bakes the groups of receivers that are missing, and when all are there seals the set.
+    pub fn run(&self, cx: &Context) -> Result<Outcome> {
+        let (params, clock) = (self.params()?, seconds());
+        let world = cx.opaque_world(&self.scene)?;
+        let places = Places::read(&self.probes)?;
+        places.provenance().check_scene(&self.probes, &world.scene.hash)?;
+        let provenance =
+            Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params).with_input("probes", hash_file(&self.probes)?);
+        if self.is_up_to_date(&provenance) {
+            touch(&ProbeSet::path(&self.output));
+            return Ok(Outcome::up_to_date(&self.output, json!({ "baked": 0, "up_to_date": true })));
+        }
+        let plan = Plan::for_any_light(&world, params.atlas)?;
+        let ground = Ground::new(&plan, &world, positions(&places), params.radius, cx.progress());
+        let count = ground.receivers.list.len() as u32;
+        if count == 0 {
+            return Err(Error::input(&self.scene, "has no surface with a diffuse lobe: nothing receives light"));
+        }
+        let points: Vec<Vec3> = (0..count).map(|r| ground.receivers.surface(&world, r, 0).p).collect();
+        let groups = groups(&points, params.compress.most_receivers as usize);
+        let gather = params.gather();
+        let scale = gather.scale(&ground);
+        let items: Vec<usize> = (0..groups.len()).collect();
+        let is_kept = |i| is_finished(&numbered(&self.output, i), &provenance);
+        let make = |todo: &[usize]| {
+            cx.progress().start("transport", todo.len() as u64);
+            todo.par_iter().try_for_each(|&i| {
+                let rows: Vec<Row> = groups[i].par_iter().map(|&r| gather.row(&ground, r)).collect();
+                let clusters = compress(groups[i].clone(), rows, &gather, (&params.compress, scale));
+                cx.progress().advance(1);
+                encode_clusters(&clusters, &provenance).write(&numbered(&self.output, i))
+            })?;
+            cx.progress().finish();
+            Ok(())
+        };
+        let seal = || self.seal(&ground, &places, &params, groups.len(), &provenance);
+        let done = complete(&items, self.shard, &is_kept, make, seal)?;
+        Ok(self.outcome(&ground, done, clock()))
+    }
+
+    fn is_up_to_date(&self, provenance: &Provenance) -> bool {
+        let Ok(set) = TransportSet::read(&self.output) else { return false };
+        let files = files(&self.output, set.files.len().saturating_sub(2));
+        set.provenance == *provenance && files.iter().zip(&set.files).all(|(file, hash)| is_sealed_as(hash, file, provenance))
+    }
+
+    /// Writes what all groups share, and the set.
+    fn seal(
+        &self,
+        ground: &Ground,
+        places: &Places,
+        params: &TransportParams,
+        groups: usize,
+        provenance: &Provenance,
+    ) -> Result<()> {
+        let [receivers, relight] = ["receivers.exr", "relight.exr"].map(|name| self.output.join(name));
+        encode_receivers(&ground.receivers.list, provenance).write(&receivers)?;
+        let hits = RelightRays::new(params.relight_rays, params.sh_order).hits(ground);
+        encode_relight(&hits, ground.probes.len(), provenance).write(&relight)?;
+        let set = TransportSet {
+            bake: *params,
+            places: places.clone(),
+            radius: ground.radius,
+            receivers: ground.receivers.list.len(),
+            files: TransportSet::hashes(&self.output, groups)?,
+            provenance: provenance.clone(),
+        };
+        json::write(&ProbeSet::path(&self.output), &set)
+    }
+
+    fn outcome(&self, ground: &Ground, done: Done, seconds: f64) -> Outcome {
+        let Done { made, kept, missing } = done;
+        let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
+        let (receivers, probes, radius) = (ground.receivers.list.len(), ground.probes.len(), ground.radius);
+        Outcome {
+            summary: format!(
+                "{}: {receivers} receivers of {probes} probes that reach {radius:.2} m; {made} groups baked, {kept} kept, {seconds:.1} s{rest}",
+                self.output.display()
+            ),
+            figures: json!({
+                "receivers": receivers, "probes": probes, "radius": radius, "groups": made + kept + missing, "baked": made,
+                "missing": missing, "seconds": seconds,
+            }),
+            ..Outcome::default()
+        }
+    }
+}
