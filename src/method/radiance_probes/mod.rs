@@ -6,6 +6,7 @@
 //! compressed ([`compress`]). A frame lights the surfaces, gathers them at the probes ([`relight`]) and takes them from there to the receivers
 //! ([`operator`], [`light`]).
 
+pub mod bake;
 pub mod cluster;
 pub mod compress;
 pub mod harmonics;
@@ -13,9 +14,12 @@ pub mod light;
 pub mod operator;
 pub mod params;
 pub mod relight;
+pub mod round_trip;
 mod row;
 pub mod seen;
 pub mod store;
+#[cfg(test)]
+mod tests;
 pub mod transport;
 
 pub use row::METHOD;

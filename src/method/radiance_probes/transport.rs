@@ -108,6 +108,11 @@ impl Gather {
         Self { directions: (0..rays).map(direction).collect(), kept, interpolation, harmonics: Harmonics::new(order) }
     }
 
+    /// The directions, about +z.
+    pub fn directions(&self) -> &[Vec3] {
+        &self.directions
+    }
+
     /// Harmonics of a probe.
     pub fn terms(&self) -> usize {
         self.harmonics.terms()

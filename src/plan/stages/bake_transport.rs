@@ -6,20 +6,18 @@ use crate::io::Provenance;
 use crate::io::jobs::{Done, Shard, complete, is_finished, is_sealed_as, touch};
 use crate::io::json;
 use crate::io::provenance::hash_file;
-use crate::lightmap::{AtlasParams, Plan};
-use crate::method::radiance_probes::cluster::groups;
-use crate::method::radiance_probes::compress::{CompressParams, compress};
+use crate::lightmap::AtlasParams;
+use crate::method::radiance_probes::bake::Bake;
+use crate::method::radiance_probes::compress::CompressParams;
 use crate::method::radiance_probes::params::TransportParams;
-use crate::method::radiance_probes::relight::RelightRays;
 use crate::method::radiance_probes::seen::Ground;
 use crate::method::radiance_probes::store::{TransportSet, encode_clusters, encode_receivers, encode_relight, files, positions};
-use crate::method::radiance_probes::transport::{Interpolation, Kept, Row};
+use crate::method::radiance_probes::transport::{Interpolation, Kept};
 use crate::plan::option::{stage, text};
 use crate::plan::{Context, Outcome};
 use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, numbered};
 use crate::{Error, Result};
-use glam::Vec3;
 use rayon::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
@@ -107,32 +105,22 @@ impl BakeTransport {
             touch(&ProbeSet::path(&self.output));
             return Ok(Outcome::up_to_date(&self.output, json!({ "baked": 0, "up_to_date": true })));
         }
-        let plan = Plan::for_any_light(&world, params.atlas)?;
-        let ground = Ground::new(&plan, &world, positions(&places), params.radius, cx.progress());
-        let count = ground.receivers.list.len() as u32;
-        if count == 0 {
-            return Err(Error::input(&self.scene, "has no surface with a diffuse lobe: nothing receives light"));
-        }
-        let points: Vec<Vec3> = (0..count).map(|r| ground.receivers.surface(&world, r, 0).p).collect();
-        let groups = groups(&points, params.compress.most_receivers as usize);
-        let gather = params.gather();
-        let scale = gather.scale(&ground);
-        let items: Vec<usize> = (0..groups.len()).collect();
+        let bake = Bake::new(&world, positions(&places), &params, cx.progress())?;
+        let items: Vec<usize> = (0..bake.groups()).collect();
         let is_kept = |i| is_finished(&numbered(&self.output, i), &provenance);
         let make = |todo: &[usize]| {
             cx.progress().start("transport", todo.len() as u64);
             todo.par_iter().try_for_each(|&i| {
-                let rows: Vec<Row> = groups[i].par_iter().map(|&r| gather.row(&ground, r)).collect();
-                let clusters = compress(groups[i].clone(), rows, &gather, (&params.compress, scale));
+                let clusters = bake.group(i);
                 cx.progress().advance(1);
                 encode_clusters(&clusters, &provenance).write(&numbered(&self.output, i))
             })?;
             cx.progress().finish();
             Ok(())
         };
-        let seal = || self.seal(&ground, &places, &params, groups.len(), &provenance);
+        let seal = || self.seal(&bake, &places, &params, &provenance);
         let done = complete(&items, self.shard, &is_kept, make, seal)?;
-        Ok(self.outcome(&ground, done, clock()))
+        Ok(self.outcome(&bake.ground, done, clock()))
     }
 
     fn is_up_to_date(&self, provenance: &Provenance) -> bool {
@@ -142,24 +130,17 @@ impl BakeTransport {
     }
 
     /// Writes what all groups share, and the set.
-    fn seal(
-        &self,
-        ground: &Ground,
-        places: &Places,
-        params: &TransportParams,
-        groups: usize,
-        provenance: &Provenance,
-    ) -> Result<()> {
+    fn seal(&self, bake: &Bake, places: &Places, params: &TransportParams, provenance: &Provenance) -> Result<()> {
+        let ground = &bake.ground;
         let [receivers, relight] = ["receivers.exr", "relight.exr"].map(|name| self.output.join(name));
         encode_receivers(&ground.receivers.list, provenance).write(&receivers)?;
-        let hits = RelightRays::new(params.relight_rays, params.sh_order).hits(ground);
-        encode_relight(&hits, ground.probes.len(), provenance).write(&relight)?;
+        encode_relight(&bake.hits(), ground.probes.len(), provenance).write(&relight)?;
         let set = TransportSet {
             bake: *params,
             places: places.clone(),
             radius: ground.radius,
             receivers: ground.receivers.list.len(),
-            files: TransportSet::hashes(&self.output, groups)?,
+            files: TransportSet::hashes(&self.output, bake.groups())?,
             provenance: provenance.clone(),
         };
         json::write(&ProbeSet::path(&self.output), &set)
