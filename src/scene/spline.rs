@@ -18,9 +18,7 @@ impl Spline {
             return Err(format!("keyframes[{i}]: time {}: expected a finite number", times[i]));
         }
         match times.windows(2).position(|t| t[0] >= t[1]) {
-            Some(i) => {
-                Err(format!("keyframes[{}]: time {} follows {}: expected ascending times", i + 1, times[i + 1], times[i]))
-            }
+            Some(i) => Err(format!("keyframes[{}]: time {} follows {}: expected ascending times", i + 1, times[i + 1], times[i])),
             None if times.is_empty() => Err("keyframes: found none".into()),
             None => Ok(Self { times }),
         }

@@ -48,12 +48,9 @@ impl Animation {
         let text = read_text(path)?;
         let file: LightsFile = json::written_by_hand(path, &text)?;
         let bad = |message: String| Error::input(path, message);
-        for (name, list) in [
-            ("lights", &file.lights),
-            ("materials", &file.materials),
-            ("emission", &file.emission),
-            ("objects", &file.objects),
-        ] {
+        for (name, list) in
+            [("lights", &file.lights), ("materials", &file.materials), ("emission", &file.emission), ("objects", &file.objects)]
+        {
             if list.len() > MAX_ENTRIES {
                 return Err(bad(format!("{name}: found {} entries, expected at most {MAX_ENTRIES}", list.len())));
             }

@@ -59,9 +59,7 @@ fn light(value: &Value, place: String, last: &mut Last) -> Result<Light> {
             cutoff: entry.track(CUTOFF)?.unwrap_or_else(|| Track::still(DVec3::splat(20.0))),
             beam: entry.track(BEAM)?,
         },
-        "directional" => {
-            Light::Directional { direction: entry.required(DIRECTION)?, irradiance: entry.required(IRRADIANCE)? }
-        }
+        "directional" => Light::Directional { direction: entry.required(DIRECTION)?, irradiance: entry.required(IRRADIANCE)? },
         _ => Light::Area {
             position: entry.required(POSITION)?,
             target: entry.required(TARGET)?,
@@ -143,7 +141,9 @@ fn read(file: &Path) -> crate::Result<Arc<Mesh>> {
         "obj" => obj::load(file)?,
         "ply" => ply::load(file)?,
         "serialized" => serialized::load(file, 0)?,
-        other => return Err(Error::Request(format!("{}: expected an obj, ply or serialized file, not .{other}", file.display()))),
+        other => {
+            return Err(Error::Request(format!("{}: expected an obj, ply or serialized file, not .{other}", file.display())));
+        }
     };
     match read.mesh.triangles.is_empty() {
         true => Err(Error::input(file, "the mesh has no faces")),

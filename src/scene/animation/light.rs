@@ -97,7 +97,13 @@ impl Light {
     }
 
     /// The emitter at a time, in metres, and its rectangle in `geometry` with a `material` that reflects nothing. `index` is the emitter's own.
-    pub fn add(&self, time: f64, unit_scale: f32, geometry: &mut Geometry, (name, material, index): (String, u32, u32)) -> Emitter {
+    pub fn add(
+        &self,
+        time: f64,
+        unit_scale: f32,
+        geometry: &mut Geometry,
+        (name, material, index): (String, u32, u32),
+    ) -> Emitter {
         let metres = |position: &Track| (position.at(time) * f64::from(unit_scale)).as_vec3();
         // Lengths grow by the unit scale; so must intensities, for the same irradiance.
         let watts = |intensity: &Track| intensity.color(time) * (unit_scale * unit_scale);

@@ -120,7 +120,7 @@ fn only_kept_triangles_are_hit() {
     let mut random = Random(2);
     let scene = scene_of(soup(200, &mut random), Mat4::IDENTITY);
     let bvh = Bvh::build(&scene, &|t| t.is_multiple_of(2));
-    let mut odd = scene.geometry.clone();
+    let mut odd = Geometry::clone(&scene.geometry);
     odd.triangles.iter_mut().skip(1).step_by(2).for_each(|t| *t = [0; 3]);
     for i in 0..2000 {
         let ray = ray_of(i, &scene.geometry, 1.0, &mut random);
