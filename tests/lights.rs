@@ -451,3 +451,15 @@ fn frames_from_the_command_line() {
     let message = f.refusal("render-path scene.xml --lights none.json --method path-trace -o no");
     assert!(message.contains("none.json"), "{message}");
 }
+
+#[test]
+fn the_example_of_the_docs_is_a_file_for_the_room() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let docs = std::fs::read_to_string(root.join("docs/lights.md")).unwrap();
+    let example = docs.split("```json\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let f = folder("");
+    std::fs::copy(root.join("scenes/room/bowl.obj"), f.at("bowl.obj")).unwrap();
+    let room = load(&root.join("scenes/room/scene.xml"), &LoadOptions::default()).unwrap();
+    let read = animation(&f, &room, example).unwrap();
+    assert_eq!((read.frames(), read.lights.len(), read.objects.len(), read.changed_materials().len()), (49, 4, 3, 2));
+}
