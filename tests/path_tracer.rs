@@ -193,7 +193,7 @@ fn emitter_samples_bsdf_samples_and_both_agree() {
         both.assert_agrees(&emitters, 0.03);
         // A world that does not know its emitters has nothing to weigh against.
         let mut blind = world;
-        blind.lights = Lights::default();
+        blind.lights = Lights::default().into();
         let bsdfs = estimate(65536, seed + 2, |s| scattered(&blind, &surface, -ray.d, Query::default(), None, &ONE_BOUNCE, s));
         both.assert_agrees(&bsdfs, 0.03);
     }

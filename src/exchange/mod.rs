@@ -1,5 +1,6 @@
 //! Files that scenes come in, read into [`crate::scene`]'s types.
 
+pub mod animation;
 pub mod mesh;
 pub mod mitsuba;
 

@@ -29,6 +29,19 @@ pub fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
     serde_json::from_str(text).map_err(fail)
 }
 
+/// What a file says that people write, without a checksum.
+///
+/// # Errors
+/// It is no JSON, or not of the type, with the line.
+pub fn written_by_hand<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
+    serde_json::from_str(text).map_err(|e| {
+        // Without serde_json's own " at line L column C", as the error says the line itself.
+        let message = e.to_string();
+        let message = message.split(" at line ").next().unwrap_or_default().to_owned();
+        Error::at_line(path, e.line() as u32, message)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -30,7 +30,7 @@ fn sky(radiance: f32) -> Emitter {
 }
 
 fn scene(geometry: Geometry, material: Material, emitters: Vec<Emitter>) -> Scene {
-    Scene { geometry, materials: vec![material], emitters, ..Default::default() }
+    Scene { geometry: geometry.into(), materials: vec![material], emitters, ..Default::default() }
 }
 
 fn params(texel: f32, spp: u32) -> LightMapParams {

@@ -165,7 +165,7 @@ mod tests {
 
     fn scene() -> Scene {
         let mut scene = Scene { hash: "this scene".into(), ..Default::default() };
-        testing::cuboid(&mut scene.geometry, Vec3::ZERO, Vec3::ONE);
+        testing::cuboid(scene.geometry_mut(), Vec3::ZERO, Vec3::ONE);
         scene
     }
 

@@ -17,7 +17,7 @@ use crate::base::progress::Progress;
 use crate::gpu::Gpu;
 use crate::io::ExrImage;
 use crate::lightmap::LightMap;
-use crate::scene::Scene;
+use crate::scene::{Animation, Scene};
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::View;
@@ -210,6 +210,8 @@ pub fn as_given(parameters: Value, _: &Scene) -> Result<ForScene> {
 pub struct Setup<'a> {
     /// The scene.
     pub world: &'a World,
+    /// Lights, materials and objects that change from frame to frame.
+    pub animation: Option<&'a Animation>,
     /// All views that will be rendered, in order.
     pub views: &'a [View],
     /// The method's parameters, as its row has checked them.
@@ -232,6 +234,19 @@ impl<'a> Setup<'a> {
     /// The parameters in their own type.
     pub fn parameters<T: serde::de::DeserializeOwned>(&self) -> Result<T> {
         serde_json::from_value(self.parameters.clone()).map_err(|e| Error::Request(e.to_string()))
+    }
+
+    /// The world of a view's frame, where it is not that of the scene.
+    pub fn world_at(&self, view: &View) -> Option<World> {
+        self.animation.map(|animation| self.world.at(animation, view.frame))
+    }
+
+    /// An error where something changes from frame to frame, from a device that keeps the scene as it is.
+    pub fn refuse_animation(&self, device: &str) -> Result<()> {
+        match self.animation {
+            Some(_) => Err(Error::Request(format!("--lights: {device} has the scene's own light alone; use --device cpu"))),
+            None => Ok(()),
+        }
     }
 
     /// The light map of a method that does nothing without it.

@@ -139,7 +139,8 @@ impl Frames<'_> {
         let [width, height] = view.camera.size.map(|n| n as usize);
         let mut image = frame.with_pictures(ExrImage::new(width, height));
         if self.setup.inspect {
-            image = with_first_hits(image, self.setup.world, &view.camera);
+            let of_frame = self.setup.world_at(view);
+            image = with_first_hits(image, of_frame.as_ref().unwrap_or(self.setup.world), &view.camera);
         }
         if let Some(more) = &frame.inspected {
             image.channels.extend(more.channels.iter().cloned());

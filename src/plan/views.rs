@@ -1,6 +1,6 @@
 //! Which views to render: those of a camera path, or the scene's own sensor's.
 
-use crate::scene::{Scene, camera_path};
+use crate::scene::{Camera, Scene, camera_path};
 use crate::view::View;
 use crate::{Error, Result};
 use std::path::Path;
@@ -56,6 +56,25 @@ super::option::text!(FrameList);
 
 /// The views of a camera path, or of the scene's own sensor, at `size` if given (the horizontal field of view stays).
 pub fn views(scene: &Scene, path: Option<&Path>, size: Option<[u32; 2]>, frames: Option<&FrameList>) -> Result<Vec<View>> {
+    chosen(cameras(scene, path, size)?, frames)
+}
+
+/// The same for a scene that changes: a single camera stays for so many frames, and of several each has its own.
+pub fn views_of_changes(
+    scene: &Scene,
+    path: Option<&Path>,
+    size: Option<[u32; 2]>,
+    frames: Option<&FrameList>,
+    count: u32,
+) -> Result<Vec<View>> {
+    let mut cameras = cameras(scene, path, size)?;
+    if let [only] = cameras.as_slice() {
+        cameras = vec![only.clone(); count as usize];
+    }
+    chosen(cameras, frames)
+}
+
+fn cameras(scene: &Scene, path: Option<&Path>, size: Option<[u32; 2]>) -> Result<Vec<Camera>> {
     let mut cameras = match path {
         Some(file) => camera_path::load(file, scene.sensor.as_ref(), scene.unit_scale.0)?,
         None => {
@@ -66,6 +85,10 @@ pub fn views(scene: &Scene, path: Option<&Path>, size: Option<[u32; 2]>, frames:
     if let Some(size) = size {
         cameras.iter_mut().for_each(|c| c.size = size);
     }
+    Ok(cameras)
+}
+
+fn chosen(cameras: Vec<Camera>, frames: Option<&FrameList>) -> Result<Vec<View>> {
     let count = cameras.len();
     let chosen = |frame: u32| frames.is_none_or(|f| f.has(frame));
     let views: Vec<View> = (0..).zip(cameras).filter(|(i, _)| chosen(*i)).map(|(frame, camera)| View { frame, camera }).collect();

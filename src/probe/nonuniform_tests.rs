@@ -28,7 +28,7 @@ fn world(fill: impl FnOnce(&mut Geometry)) -> World {
     fill(&mut geometry);
     let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::splat(0.5)) });
     let material = Material { name: "wall".into(), bsdf, opacity: None };
-    World::new(Scene { geometry, materials: vec![material], ..Default::default() })
+    World::new(Scene { geometry: geometry.into(), materials: vec![material], ..Default::default() })
 }
 
 /// A closed room with a closed box on its floor, a sheet on a wall, and something far outside.

@@ -2,7 +2,8 @@
 
 use super::Camera;
 use super::camera::FovAxis;
-use crate::io::read_text;
+use super::spline::Spline;
+use crate::io::{json, read_text};
 use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
@@ -61,12 +62,7 @@ pub fn load(path: &Path, sensor: Option<&Camera>, unit_scale: f32) -> Result<Vec
 
 fn parse(path: &Path, text: &str, sensor: Option<&Camera>, unit_scale: f32) -> Result<Vec<Camera>> {
     let bad = |message: String| Error::input(path, message);
-    // Without serde_json's own " at line L column C", as the error says the line itself.
-    let file: PathFile = serde_json::from_str(text).map_err(|e| {
-        let message = e.to_string();
-        let message = message.split(" at line ").next().unwrap_or_default().to_owned();
-        Error::at_line(path, e.line() as u32, message)
-    })?;
+    let file: PathFile = json::written_by_hand(path, text)?;
     let Some(size) = file.size.or(sensor.map(|s| s.size)) else {
         return Err(bad("found no \"size\", and the scene has no sensor to take it from".into()));
     };
@@ -115,9 +111,7 @@ fn camera(
 /// Frames at every 1 / fps second from the first keyframe to the last.
 fn interpolate(keys: &[Keyframe], file: &PathFile) -> std::result::Result<Vec<FrameEntry>, String> {
     let (Some(first), Some(last)) = (keys.first(), keys.last()) else { return Ok(Vec::new()) };
-    if let Some((i, pair)) = keys.windows(2).enumerate().find(|(_, k)| k[0].time >= k[1].time) {
-        return Err(format!("keyframes[{}]: time {} follows {}: expected ascending times", i + 1, pair[1].time, pair[0].time));
-    }
+    let spline = Spline::new(keys.iter().map(|k| k.time).collect())?;
     let some_fov = keys.iter().any(|k| k.fov.is_some());
     if some_fov && file.fov.is_none() && keys.iter().any(|k| k.fov.is_none()) {
         return Err("some keyframes give a \"fov\" and some do not: give it to all, or to the path".into());
@@ -133,7 +127,6 @@ fn interpolate(keys: &[Keyframe], file: &PathFile) -> std::result::Result<Vec<Fr
     if count > MAX_FRAMES {
         return Err(format!("{count} frames are more than the {MAX_FRAMES} allowed"));
     }
-    let spline = Spline { times: keys.iter().map(|k| k.time).collect() };
     let column = |of: &dyn Fn(&Keyframe) -> DVec3| keys.iter().map(of).collect::<Vec<_>>();
     let (origins, targets, ups) = (column(&|k| k.origin), column(&|k| k.target), column(&|k| k.up));
     let fovs = some_fov.then(|| column(&|k| DVec3::splat(k.fov.or(file.fov).unwrap_or(0.0))));
@@ -147,33 +140,6 @@ fn interpolate(keys: &[Keyframe], file: &PathFile) -> std::result::Result<Vec<Fr
         }
     };
     Ok((0..count as usize).map(frame).collect())
-}
-
-/// Catmull-Rom over times that need not be even: a cubic Hermite spline whose slope at a key is that of the chord between
-/// its neighbours (at the ends: of the only chord).
-struct Spline {
-    times: Vec<f64>,
-}
-
-impl Spline {
-    fn at(&self, values: &[DVec3], time: f64) -> DVec3 {
-        let n = self.times.len();
-        if n == 1 {
-            return values[0];
-        }
-        let i = self.times.partition_point(|&t| t <= time).clamp(1, n - 1) - 1;
-        let slope = |k: usize| {
-            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
-            (values[b] - values[a]) / (self.times[b] - self.times[a])
-        };
-        let h = self.times[i + 1] - self.times[i];
-        let s = (time - self.times[i]) / h;
-        let (s2, s3) = (s * s, s * s * s);
-        values[i] * (2.0 * s3 - 3.0 * s2 + 1.0)
-            + values[i + 1] * (3.0 * s2 - 2.0 * s3)
-            + slope(i) * (h * (s3 - 2.0 * s2 + s))
-            + slope(i + 1) * (h * (s3 - s2))
-    }
 }
 
 #[cfg(test)]
@@ -210,18 +176,6 @@ mod tests {
         assert_eq!(cameras.len(), 21);
         for (i, c) in cameras.iter().enumerate() {
             assert!((c.position() - Vec3::new(0.2 * i as f32, 0.0, 5.0)).length() < 1e-5, "{i}: {}", c.position());
-        }
-    }
-
-    #[test]
-    fn evenly_spaced_keys_give_the_uniform_catmull_rom_spline() {
-        let spline = Spline { times: vec![0.0, 1.0, 2.0, 3.0] };
-        let p = [DVec3::ZERO, DVec3::X, DVec3::new(2.0, 3.0, 0.0), DVec3::new(1.0, 4.0, 2.0)];
-        // The middle of a segment is (-p0 + 9 p1 + 9 p2 - p3) / 16.
-        let expected = (-p[0] + 9.0 * p[1] + 9.0 * p[2] - p[3]) / 16.0;
-        assert!((spline.at(&p, 1.5) - expected).length() < 1e-12);
-        for (i, key) in p.iter().enumerate() {
-            assert!((spline.at(&p, i as f64) - *key).length() < 1e-12);
         }
     }
 

@@ -61,6 +61,24 @@ impl Geometry {
         object.triangles.contains(&triangle).then_some(index as u32)
     }
 
+    /// A copy that so many more vertices and triangles fit in without being moved.
+    pub fn with_room(&self, vertices: usize, triangles: usize) -> Self {
+        fn copy<T: Clone>(list: &[T], more: usize) -> Vec<T> {
+            let mut copy = Vec::with_capacity(list.len() + more);
+            copy.extend_from_slice(list);
+            copy
+        }
+        Self {
+            positions: copy(&self.positions, vertices),
+            normals: copy(&self.normals, vertices),
+            uvs: copy(&self.uvs, vertices),
+            triangles: copy(&self.triangles, triangles),
+            triangle_object: copy(&self.triangle_object, triangles),
+            objects: self.objects.clone(),
+            rounds: self.rounds.clone(),
+        }
+    }
+
     /// Geometric normal times twice the area. `flipNormals` is already in the winding.
     pub fn area_normal(&self, triangle: u32) -> Vec3 {
         let [a, b, c] = self.corners(triangle);

@@ -45,7 +45,7 @@ mod tests {
 
     fn scene(pixel: f32) -> Scene {
         let mut scene = Scene::default();
-        append(&mut scene.geometry, primitives::cube(), Mat4::IDENTITY, false, false, "cube".into(), 0, None);
+        append(scene.geometry_mut(), primitives::cube(), Mat4::IDENTITY, false, false, "cube".into(), 0, None);
         let image = Arc::new(Image::new(1, 2, vec![Rgb::ONE, Rgb::splat(pixel)]));
         let bitmap = Bitmap { image, to_uv: Affine2::IDENTITY, nearest: false, wrap: Wrap::Repeat, scale: 1.0 };
         let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Bitmap(bitmap) });
@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(same.len(), 64);
         for alike in [
             hash(&|s| s.materials[0].name = "other".into()),
-            hash(&|s| s.geometry.objects[0].name = "other".into()),
+            hash(&|s| s.geometry_mut().objects[0].name = "other".into()),
             hash(&|s| s.sensor = Some(Camera::look_at(Vec3::ZERO, Vec3::Z, Vec3::Y, 1.0, [4, 4]))),
             hash(&|s| s.path = "elsewhere.xml".into()),
         ] {
@@ -73,11 +73,11 @@ mod tests {
         }
         let others = [
             content(&scene(0.25)).unwrap(),
-            hash(&|s| s.geometry.positions[0].x += 1e-6),
-            hash(&|s| s.geometry.normals[3] = -s.geometry.normals[3]),
-            hash(&|s| s.geometry.uvs[5].y += 0.5),
-            hash(&|s| s.geometry.triangles.swap(0, 1)),
-            hash(&|s| s.geometry.objects[0].face_normals = true),
+            hash(&|s| s.geometry_mut().positions[0].x += 1e-6),
+            hash(&|s| s.geometry_mut().normals[3] = -s.geometry.normals[3]),
+            hash(&|s| s.geometry_mut().uvs[5].y += 0.5),
+            hash(&|s| s.geometry_mut().triangles.swap(0, 1)),
+            hash(&|s| s.geometry_mut().objects[0].face_normals = true),
             hash(&|s| s.emitters.push(Emitter::Constant { radiance: Rgb::ONE })),
             hash(&|s| s.materials[0].opacity = Some(Opacity::constant(0.5))),
         ];

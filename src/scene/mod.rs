@@ -1,5 +1,6 @@
 //! A scene as the stages see it: world-space triangles, materials, emitters and the sensor.
 
+pub mod animation;
 pub mod camera;
 pub mod camera_path;
 pub mod emitter;
@@ -10,22 +11,25 @@ pub mod mesh;
 pub mod normals;
 pub mod primitives;
 pub mod round;
+pub mod spline;
 pub mod summary;
 pub mod units;
 
 use crate::material::Material;
 use std::path::PathBuf;
+use std::sync::Arc;
 
+pub use animation::Animation;
 pub use camera::Camera;
 pub use emitter::Emitter;
 pub use geometry::{Geometry, Object};
 pub use round::Round;
 
 /// A loaded scene. Everything is in world space and metres: the file's units times [`Self::unit_scale`].
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub struct Scene {
-    /// All triangles of all shapes.
-    pub geometry: Geometry,
+    /// All triangles of all shapes; scenes that differ in light or materials alone share them.
+    pub geometry: Arc<Geometry>,
     /// Materials; `Object::material` indexes them.
     pub materials: Vec<Material>,
     /// Emitters; `Object::emitter` indexes the area lights among them.
@@ -50,4 +54,11 @@ pub struct Scene {
     pub path: PathBuf,
     /// What was odd but no error: unknown properties, say. One line each, with file and line.
     pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// The triangles, to be changed: copied first where another scene has them too.
+    pub fn geometry_mut(&mut self) -> &mut Geometry {
+        Arc::make_mut(&mut self.geometry)
+    }
 }

@@ -150,7 +150,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
         let mut scene = Scene::default();
-        append(&mut scene.geometry, mesh, m, flip, false, String::new(), 0, None);
+        append(scene.geometry_mut(), mesh, m, flip, false, String::new(), 0, None);
         scene
     }
 
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn without_texture_coordinates_the_barycentrics_stand_in() {
         let mut scene = quad(true, Mat4::IDENTITY, false);
-        scene.geometry.objects[0].has_uvs = false;
+        scene.geometry_mut().objects[0].has_uvs = false;
         let found = surface(&scene, &Hit { t: 1.0, triangle: 1, u: 0.25, v: 0.5 });
         assert_eq!(found.uv, Vec2::new(0.25, 0.5));
         assert!((found.dp_du.cross(found.dp_dv) - found.ng).length() < 1e-6);
@@ -201,7 +201,7 @@ mod tests {
         {
             let mut scene = Scene::default();
             let ball = primitives::sphere(centre, radius);
-            append(&mut scene.geometry, ball, Mat4::IDENTITY, false, false, String::new(), 0, None);
+            append(scene.geometry_mut(), ball, Mat4::IDENTITY, false, false, String::new(), 0, None);
             let bvh = Bvh::build(&scene, &|_| true);
             let mut seen = 0;
             for i in 0..4000u32 {

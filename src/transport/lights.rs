@@ -393,7 +393,7 @@ mod tests {
         };
         let mut emitters = vec![Emitter::Area { object: 0, radiance: Texture::Constant(Rgb::new(1.0, 2.0, 3.0)) }];
         emitters.extend(others);
-        Scene { geometry, emitters, ..Scene::default() }
+        Scene { geometry: geometry.into(), emitters, ..Scene::default() }
     }
 
     #[test]

@@ -6,19 +6,34 @@ use super::lights::Lights;
 use crate::base::math::Rgb;
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
-use crate::scene::Scene;
+use crate::scene::{Animation, Scene};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Scene, BVH and emitter distributions: what every ray-tracing stage takes.
+///
+/// The world of an animation's frame shares with that of the scene whatever is the same in both.
 pub struct World {
     /// The scene.
     pub scene: Scene,
-    /// Its acceleration structure.
-    pub bvh: Bvh,
+    /// Acceleration structure over the scene's own triangles.
+    pub bvh: Arc<Bvh>,
     /// Its emitters, ready for sampling.
-    pub lights: Lights,
-    pub(crate) facets: Vec<Facet>,
+    pub lights: Arc<Lights>,
+    pub(crate) facets: Arc<Vec<Facet>>,
+    /// What an animation adds to the scene's own triangles.
+    pub(crate) added: Option<Box<Added>>,
+    /// Whether shapes emit that do not in the scene file: `facets` do not tell of them.
+    pub(crate) relit: bool,
+}
+
+/// Triangles after those of the scene.
+///
+/// *Ours*: a tree of their own, asked after the scene's, as the latter takes seconds to build.
+pub(crate) struct Added {
+    bvh: Bvh,
+    facets: Vec<Facet>,
 }
 
 impl World {
@@ -35,16 +50,33 @@ impl World {
     }
 
     fn with_filter(scene: Scene, keep: impl Fn(&Scene, u32) -> bool) -> Self {
-        let bvh = Bvh::build(&scene, &|t| keep(&scene, t));
-        let lights = Lights::new(&scene);
-        let count = scene.geometry.triangles.len() as u32;
-        let facets = (0..count).into_par_iter().map(|t| Facet::new(&scene.geometry, t)).collect();
-        Self { scene, bvh, lights, facets }
+        let bvh = Bvh::build(&scene, &|t| keep(&scene, t)).into();
+        let lights = Lights::new(&scene).into();
+        let facets = facets(&scene, 0).into();
+        Self { scene, bvh, lights, facets, added: None, relit: false }
+    }
+
+    /// The world of a frame: this one's, which is that of `animation`'s scene, with the animation's lights, materials and objects. A world
+    /// without transmissive shapes stays without.
+    pub fn at(&self, animation: &Animation, frame: u32) -> Self {
+        let scene = animation.scene_at(&self.scene, frame);
+        let (own, all) = (&self.scene.geometry, &scene.geometry);
+        let first = own.triangles.len() as u32;
+        let added = (all.triangles.len() as u32 > first)
+            .then(|| Box::new(Added { bvh: self.bvh.beside(&scene, first), facets: facets(&scene, first) }));
+        let relit = own.objects.iter().zip(&all.objects).any(|(a, b)| a.emitter != b.emitter);
+        let lights = if animation.changes_light() { Lights::new(&scene).into() } else { self.lights.clone() };
+        Self { scene, bvh: self.bvh.clone(), lights, facets: self.facets.clone(), added, relit }
     }
 
     /// First hit of a ray.
+    #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.bvh.closest(&self.scene, ray)
+        let own = self.bvh.closest(&self.scene, ray);
+        match &self.added {
+            None => own,
+            Some(added) => added.closest(&self.scene, ray, own),
+        }
     }
 
     /// First surface along a ray.
@@ -77,15 +109,45 @@ impl World {
     /// The surface that a hit lies on.
     #[inline]
     pub fn surface(&self, hit: &Hit) -> Surface {
-        let facet = &self.facets[hit.triangle as usize];
-        match facet.round(&self.scene.geometry) {
+        let facet = self.facets.get(hit.triangle as usize).unwrap_or_else(|| self.added_facet(hit.triangle));
+        let mut surface = match facet.round(&self.scene.geometry) {
             None => facet.surface(hit),
             Some(round) => facet.surface_of(round, hit),
+        };
+        if self.relit {
+            surface.emitter = self.scene.geometry.objects[surface.object as usize].emitter;
         }
+        surface
+    }
+
+    #[cold]
+    fn added_facet(&self, triangle: u32) -> &Facet {
+        let own = self.facets.len();
+        self.added.as_ref().map_or(&self.facets[0], |added| &added.facets[triangle as usize - own])
     }
 
     /// Whether something blocks a ray.
+    #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.bvh.occluded(&self.scene, ray)
+        let by_added = |added: &Added| added.bvh.occluded(&self.scene, ray);
+        self.bvh.occluded(&self.scene, ray) || self.added.as_deref().is_some_and(by_added)
     }
+}
+
+impl Added {
+    /// The closer of `own`, the scene's hit, and one of these triangles; at the same distance `own`, which has the lower index.
+    fn closest(&self, scene: &Scene, ray: &Ray, own: Option<Hit>) -> Option<Hit> {
+        let nearer = Ray { t_max: own.map_or(ray.t_max, |hit| hit.t), ..*ray };
+        let found = self.bvh.closest(scene, &nearer);
+        match (&found, own) {
+            (Some(hit), Some(other)) if hit.t >= other.t => own,
+            (None, _) => own,
+            _ => found,
+        }
+    }
+}
+
+/// The facets of a scene's triangles from `first` on.
+fn facets(scene: &Scene, first: u32) -> Vec<Facet> {
+    (first..scene.geometry.triangles.len() as u32).into_par_iter().map(|t| Facet::new(&scene.geometry, t)).collect()
 }

@@ -6,6 +6,7 @@ use reprobe::material::bsdf::{Bsdf, TwoSided};
 use reprobe::material::{Material, Texture};
 use reprobe::scene::{Emitter, Object, Scene};
 use reprobe::transport::World;
+use std::sync::Arc;
 
 /// A scene under construction.
 #[derive(Default)]
@@ -21,7 +22,7 @@ pub fn two_sided(bsdf: Bsdf) -> Bsdf {
 impl Room {
     /// An object of quadrilaterals (centre, half edges x and y; the front is where x × y points). Returns its index.
     fn quads(&mut self, quads: &[[Vec3; 3]], bsdf: Bsdf) -> u32 {
-        let g = &mut self.scene.geometry;
+        let g = Arc::make_mut(&mut self.scene.geometry);
         let (index, first_triangle, first_vertex) = (g.objects.len() as u32, g.triangles.len() as u32, g.positions.len() as u32);
         for &[centre, x, y] in quads {
             let base = g.positions.len() as u32;
@@ -60,7 +61,8 @@ impl Room {
 
     /// Makes an object shine.
     pub fn emit(&mut self, object: u32, radiance: Rgb) {
-        self.scene.geometry.objects[object as usize].emitter = Some(self.scene.emitters.len() as u32);
+        let emitter = self.scene.emitters.len() as u32;
+        self.scene.geometry_mut().objects[object as usize].emitter = Some(emitter);
         self.scene.emitters.push(Emitter::Area { object, radiance: Texture::Constant(radiance) });
     }
 

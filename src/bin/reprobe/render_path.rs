@@ -15,7 +15,14 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   reprobe render-path room/scene.xml --path room/path.json --probes probes/ --lightmap lightmap.exr --curvature curvature.exr -o frames/
   reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 256 -o reference/
-  reprobe render-path room/scene.xml --path room/path.json --method lightmap-rt --lightmap lightmap.exr --match-time frames/ -o rays/")]
+  reprobe render-path room/scene.xml --path room/path.json --method lightmap-rt --lightmap lightmap.exr --match-time frames/ -o rays/
+  reprobe render-path room/scene.xml --lights lights.json --method path-trace --spp 64 -o evening/
+
+A lamp that is carried through a darkened room for two seconds, as lights.json says it (docs/lights.md has all there is):
+  {\"fps\": 24, \"scene_lights\": false, \"lights\": [
+    {\"type\": \"point\", \"intensity\": [10, 9, 7], \"keyframes\": [
+      {\"time\": 0, \"position\": [1, 1.5, 1]}, {\"time\": 2, \"position\": [4, 1.5, 2]}]}]}
+Without --path, or with a path of one frame, that camera stays for all frames of the file.")]
 pub struct Args {
     /// Mitsuba scene, XML or JSON
     #[arg(value_name = "SCENE")]
@@ -38,6 +45,8 @@ pub struct Args {
     /// Auxiliary layers (all): the first hit's, and the buffers of glossy-probes' passes
     #[arg(long, value_name = "LAYERS")]
     aov: Option<Aov>,
+    #[arg(long, value_name = "LIGHTS.json", help = used_by("lights", "lights, materials and objects that change from frame to frame, see below"))]
+    lights: Option<PathBuf>,
     #[arg(long, value_name = "DIR", help = used_by("probes", "the baked probes"))]
     probes: Option<PathBuf>,
     #[arg(long, value_name = "FILE.exr", help = used_by("lightmap", "the diffuse light"))]
@@ -94,6 +103,7 @@ impl Args {
         RenderPath {
             scene: self.scene,
             path: self.path,
+            lights: self.lights,
             frames: self.frames,
             size: self.size,
             method: Some(self.method),

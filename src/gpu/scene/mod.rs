@@ -137,6 +137,10 @@ impl GpuScene {
                 world.scene.geometry.rounds.len()
             )));
         }
+        if world.added.is_some() || world.relit {
+            let message = "the GPU has no shapes and no area lights beside those of the scene file; use --device cpu";
+            return Err(Error::Request(message.into()));
+        }
         let is_pattern = |e: &Emitter| matches!(e, Emitter::Projector { .. } | Emitter::Spot { pattern: Some(_), .. });
         if world.scene.emitters.iter().any(is_pattern) {
             let message = "the GPU has no projector and no spot with a texture; use --device cpu";

@@ -6,6 +6,7 @@
 pub(crate) mod albedo;
 pub mod blend;
 pub mod bump;
+mod change;
 pub mod conductor;
 pub mod dielectric;
 pub mod diffuse;

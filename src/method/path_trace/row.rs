@@ -11,7 +11,6 @@ use crate::gpu::{Gpu, GpuScene};
 use crate::method::{FilterChoice, ForScene, Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
 use crate::scene::Scene;
 use crate::scene::film::Filter;
-use crate::transport::World;
 use crate::transport::path::PathParams;
 use crate::view::View;
 use crate::{Error, Result};
@@ -25,7 +24,7 @@ pub const METHOD: Method = Method {
     about: "The reference: path tracing",
     reads: Reads::NOTHING,
     layers: &["emission", "diffuse", "glossy"],
-    options: &["spp", "max-depth", "denoise", "layers", "rfilter", "budget-ms", "match-time", "set"],
+    options: &["spp", "max-depth", "denoise", "layers", "rfilter", "lights", "budget-ms", "match-time", "set"],
     samples: Some(Samples { option: "spp", pointer: "/path_trace/spp" }),
     transmissive: true,
     orthographic: true,
@@ -93,29 +92,34 @@ impl Parameters for PathTraceParams {
 }
 
 /// An error for a scene without light.
-fn check_lit(world: &World) -> Result<()> {
-    if world.scene.emitters.is_empty() {
-        return Err(Error::input(&world.scene.path, "has no emitter; every frame would be black"));
+fn check_lit(setup: &Setup) -> Result<()> {
+    let scene = &setup.world.scene;
+    if scene.emitters.is_empty() && setup.animation.is_none() {
+        return Err(Error::input(&scene.path, "has no emitter; every frame would be black"));
     }
     Ok(())
 }
 
 struct OnCpu<'a> {
-    world: &'a World,
+    setup: Setup<'a>,
     params: Params,
-    seed: u32,
 }
 
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    check_lit(setup.world)?;
-    Ok(Box::new(OnCpu { world: setup.world, params: setup.parameters()?, seed: setup.seed }))
+    check_lit(setup)?;
+    Ok(Box::new(OnCpu { setup: *setup, params: setup.parameters()? }))
 }
 
 impl Renderer for OnCpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, spp: u32, progress: &dyn Progress) -> Result<Frame> {
-        let (View { frame, camera }, world, seed) = (view, self.world, self.seed);
+        let (View { frame, camera }, seed) = (view, self.setup.seed);
         let params = PathTraceParams { spp, ..self.params.path_trace };
         let mut clock = Clock::start();
+        let of_frame = self.setup.world_at(view);
+        if of_frame.is_some() {
+            clock.lap("world");
+        }
+        let world = of_frame.as_ref().unwrap_or(self.setup.world);
         if self.params.layers == LayerChoice::Full {
             let full = path_trace_full(world, camera, &params, seed, *frame, progress);
             clock.lap("path_trace");
@@ -141,7 +145,8 @@ struct OnGpu {
 }
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    check_lit(setup.world)?;
+    check_lit(setup)?;
+    setup.refuse_animation("the GPU's path tracer")?;
     let Params { path_trace, layers, denoise, .. } = setup.parameters()?;
     if path_trace.filter != Filter::Box {
         return Err(Error::Request("the GPU's path tracer has a box filter alone; use --device cpu".into()));

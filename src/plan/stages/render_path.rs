@@ -12,11 +12,11 @@ use crate::plan::budget::{self, Budget};
 use crate::plan::frames::{Frames, render};
 use crate::plan::option::{Size, stage};
 use crate::plan::timings::Timings;
-use crate::plan::views::{FrameList, views};
+use crate::plan::views::{FrameList, views, views_of_changes};
 use crate::plan::{Context, Outcome};
 use crate::probe::file::BakedSet;
 use crate::probe::store::{SET_FILE, set_hash};
-use crate::scene::Camera;
+use crate::scene::{Animation, Camera};
 use crate::surface::{CurvatureMap, curvature_file};
 use crate::transport::World;
 use crate::view::View;
@@ -39,6 +39,8 @@ stage! {
     {
         /// The camera path; the scene's own sensor is the one frame without it.
         "--path" path: Option<PathBuf>,
+        /// Lights, materials and objects that change from frame to frame.
+        "--lights" lights: Option<PathBuf>,
         /// Only these frames of it.
         "--frames" frames: Option<FrameList>,
         /// Size of the frames.
@@ -127,6 +129,7 @@ pub struct Resolved {
 /// What was read.
 struct Inputs {
     world: Arc<World>,
+    animation: Option<Animation>,
     lightmap: Option<LightMap>,
     curvature: Option<CurvatureMap>,
     provenance: Provenance,
@@ -139,8 +142,9 @@ impl RenderPath {
     }
 
     /// Options that not every method uses, and whether they are given.
-    fn given(&self) -> [(&'static str, bool); 16] {
+    fn given(&self) -> [(&'static str, bool); 17] {
         [
+            ("lights", self.lights.is_some()),
             ("probes", self.probes.is_some()),
             ("lightmap", self.lightmap.is_some()),
             ("curvature", self.curvature.is_some()),
@@ -165,8 +169,8 @@ impl RenderPath {
         let method = self.method()?;
         if let Some((option, _)) = self.given().into_iter().find(|(option, given)| *given && !method.uses(option)) {
             let others: Vec<&str> = METHODS.iter().filter(|m| m.uses(option)).map(|m| m.name).collect();
-            let name = method.name;
-            return Err(Error::Request(format!("--{option}: --method {name} has no use for it; {} has", others.join(", "))));
+            let (name, why) = (method.name, why_not(method, option));
+            return Err(Error::Request(format!("--{option}: --method {name} has no use for it{why}; {} has", others.join(", "))));
         }
         for (given, is_required, option, stage) in [
             (self.probes.is_some(), method.reads.probes.is_some(), "probes DIR", method.reads.probes.map_or("", |p| p.stage)),
@@ -223,14 +227,19 @@ impl RenderPath {
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         let Resolved { method, parameters } = self.resolve()?;
         let mut timings = Timings::of(method.name);
-        let Inputs { world, lightmap, curvature, provenance } = self.inputs(cx, method, &mut timings)?;
-        let views = views(&world.scene, self.path.as_deref(), self.size.map(|s| s.0), self.frames.as_ref())?;
+        let Inputs { world, animation, lightmap, curvature, provenance } = self.inputs(cx, method, &mut timings)?;
+        let (path, size, frames) = (self.path.as_deref(), self.size.map(|s| s.0), self.frames.as_ref());
+        let views = match &animation {
+            None => views(&world.scene, path, size, frames)?,
+            Some(animation) => views_of_changes(&world.scene, path, size, frames, animation.frames())?,
+        };
         refuse_parallel(method, &views)?;
         let (parameters, warnings) = (method.for_scene)(parameters, &world.scene)?;
         warnings.iter().for_each(|w| cx.listener.warn(w));
         let budget = Budget::read(self.budget_ms, self.match_time.as_deref(), cx)?;
         let setup = Setup {
             world: &world,
+            animation: animation.as_ref(),
             views: &views,
             parameters: &parameters,
             seed: cx.seed,
@@ -258,6 +267,13 @@ impl RenderPath {
         };
         let scene = &world.scene;
         let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
+        let animation = self.lights.as_ref().map(|file| Animation::load(file, scene)).transpose()?;
+        if let (Some(file), Some(animation)) = (&self.lights, &animation) {
+            provenance = provenance.with_input("lights", hash_file(file)?);
+            for (i, mesh) in animation.files.iter().enumerate() {
+                provenance = provenance.with_input(&format!("lights.mesh{i}"), hash_file(mesh)?);
+            }
+        }
         if let Some(folder) = &self.probes {
             provenance = provenance.with_input("probes", set_hash(folder, method.reads.probes.map_or("", |p| p.stage))?);
             if method.reads.probes.is_some_and(|p| p.any_texel) {
@@ -281,7 +297,16 @@ impl RenderPath {
         if lightmap.is_none() && method.reads.lightmap == Need::Wanted {
             cx.listener.warn("no --lightmap: the diffuse layer is black");
         }
-        Ok(Inputs { lightmap, curvature, provenance, world })
+        Ok(Inputs { animation, lightmap, curvature, provenance, world })
+    }
+}
+
+/// Why a method has no use for an option, where it is not plain.
+fn why_not(method: &Method, option: &str) -> &'static str {
+    match (option, method.reads.probes, method.reads.lightmap) {
+        ("lights", Some(_), _) => ": its probes hold the light that was baked",
+        ("lights", None, Need::Wanted | Need::Required) => ": its light map holds the light that was baked",
+        _ => "",
     }
 }
 
@@ -347,6 +372,7 @@ mod tests {
         let mut refused = 0;
         for row in METHODS {
             for (option, value) in [
+                ("lights", Some("l")),
                 ("probes", Some("p")),
                 ("lightmap", Some("l")),
                 ("curvature", Some("c")),

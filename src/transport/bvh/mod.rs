@@ -59,6 +59,15 @@ pub struct Bvh {
 impl Bvh {
     /// Builds over the triangles for which `keep` holds.
     pub fn build(scene: &Scene, keep: &dyn Fn(u32) -> bool) -> Self {
+        Self::with_margin(scene, keep, 0.0)
+    }
+
+    /// Builds over the triangles from `first` on, which stand beside those of this tree: rays to either come from as far.
+    pub fn beside(&self, scene: &Scene, first: u32) -> Self {
+        Self::with_margin(scene, &|t| t >= first, self.margin)
+    }
+
+    fn with_margin(scene: &Scene, keep: &dyn Fn(u32) -> bool, least: f32) -> Self {
         let geometry = &scene.geometry;
         let count = geometry.triangles.len() as u32;
         let has_area = |t| unit_normal(geometry.corners(t)).is_some();
@@ -67,7 +76,7 @@ impl Bvh {
         let has_opacity: Vec<bool> = scene.materials.iter().map(|m| m.opacity.is_some()).collect();
         let masked = |t| has_opacity.get(geometry.object(t).material as usize).copied().unwrap_or(false);
         let extent = kept.iter().flat_map(|&t| geometry.corners(t)).fold(0f32, |m, p| m.max(p.abs().max_element()));
-        let margin = extent * BOX_MARGIN;
+        let margin = (extent * BOX_MARGIN).max(least);
         let round_extent =
             geometry.rounds.iter().flat_map(Round::bounds).fold(extent, |m, p| m.max(p.abs().max_element() as f32));
         Self {

@@ -26,7 +26,7 @@ impl Random {
 
 fn scene_of(mesh: Mesh, m: Mat4) -> Scene {
     let mut scene = Scene::default();
-    append(&mut scene.geometry, mesh, m, false, false, String::new(), 0, None);
+    append(scene.geometry_mut(), mesh, m, false, false, String::new(), 0, None);
     scene
 }
 
@@ -120,7 +120,7 @@ fn only_kept_triangles_are_hit() {
     let mut random = Random(2);
     let scene = scene_of(soup(200, &mut random), Mat4::IDENTITY);
     let bvh = Bvh::build(&scene, &|t| t.is_multiple_of(2));
-    let mut odd = scene.geometry.clone();
+    let mut odd = Geometry::clone(&scene.geometry);
     odd.triangles.iter_mut().skip(1).step_by(2).for_each(|t| *t = [0; 3]);
     for i in 0..2000 {
         let ray = ray_of(i, &scene.geometry, 1.0, &mut random);
@@ -170,7 +170,7 @@ fn closed_meshes_do_not_leak() {
 fn masks_let_through_what_their_opacity_says() {
     let mut scene = scene_of(primitives::rectangle(), Mat4::IDENTITY);
     let back = Mat4::from_translation(Vec3::NEG_Z);
-    append(&mut scene.geometry, primitives::rectangle(), back, false, false, String::new(), 1, None);
+    append(scene.geometry_mut(), primitives::rectangle(), back, false, false, String::new(), 1, None);
     let material = |opacity: Option<f32>| Material {
         name: String::new(),
         bsdf: Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::ONE) }),
@@ -240,7 +240,7 @@ fn all_forms_answer_bit_for_bit() {
     }
     let mut random = Random(5);
     let mut scene = scene_of(soup(1200, &mut random), Mat4::IDENTITY);
-    append(&mut scene.geometry, primitives::sphere(Vec3::X, 0.4), Mat4::IDENTITY, false, false, String::new(), 0, None);
+    append(scene.geometry_mut(), primitives::sphere(Vec3::X, 0.4), Mat4::IDENTITY, false, false, String::new(), 0, None);
     let bvh = Bvh::build(&scene, &|_| true);
     let mut hits = 0;
     for i in 0..6000 {

@@ -63,7 +63,7 @@ impl<'a> Builder<'a> {
             return Ok(());
         }
         params.finish(&mut self.scene.warnings);
-        let g = &mut self.scene.geometry;
+        let g = self.scene.geometry_mut();
         // A bit of a triangle's index is the tree's.
         let most = u32::MAX as usize / 2;
         if g.positions.len() + mesh.positions.len() > most || g.triangles.len() + mesh.triangles.len() > most {
