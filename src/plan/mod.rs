@@ -8,6 +8,7 @@ pub mod budget;
 pub mod context;
 pub mod evaluation;
 pub mod frames;
+mod lights;
 pub mod option;
 pub mod overwrite;
 pub mod pipeline;

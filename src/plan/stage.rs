@@ -155,7 +155,7 @@ impl Stage {
             Self::BakeLightmap(s) => vec![&s.scene],
             Self::BakeLightfield(s) => vec![&s.scene],
             Self::BakeTransport(s) => vec![&s.scene],
-            Self::Relight(s) => vec![&s.scene],
+            Self::Relight(s) => [&s.scene].into_iter().chain(&s.lights).collect(),
             Self::BakeProbes(s) => [&s.scene].into_iter().chain(&s.for_path).collect(),
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),

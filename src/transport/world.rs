@@ -126,6 +126,16 @@ impl World {
         self.added.as_ref().map_or(&self.facets[0], |added| &added.facets[triangle as usize - own])
     }
 
+    /// Whether an animation adds shapes to the scene's.
+    pub fn has_added(&self) -> bool {
+        self.added.is_some()
+    }
+
+    /// Whether a shape that an animation adds blocks a ray.
+    pub fn occluded_by_added(&self, ray: &Ray) -> bool {
+        self.added.as_deref().is_some_and(|added| added.bvh.occluded(&self.scene, ray))
+    }
+
     /// Whether something blocks a ray.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {

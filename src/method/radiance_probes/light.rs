@@ -14,6 +14,7 @@ use crate::transport::path::{PathParams, transmitted_irradiance};
 use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::f32::consts::FRAC_1_PI;
 
 /// Light at the receivers.
@@ -44,42 +45,62 @@ pub fn direct(world: &World, receivers: &[Receiver], samples: u32, seed: u32) ->
     receivers.par_iter().with_min_len(64).map(of).collect()
 }
 
-/// What of E_T each receiver sends on as diffuse radiance: the mean over directions of `diffuse_out`, over π.
-pub fn reflectances(world: &World, receivers: &[Receiver]) -> Vec<Rgb> {
-    let of = |r: &Receiver| {
-        let side = if r.back { -1.0 } else { 1.0 };
-        let out = |k: usize| {
-            let at = surface(world, r, k);
-            let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / POINTS as f32, (0.618 * k as f32 + 0.3).fract()));
-            let bsdf = &world.scene.materials[at.material as usize].bsdf;
-            bsdf.diffuse_out(&at, Vec3::new(d.x, d.y, d.z * side))
-        };
-        (0..POINTS).map(out).sum::<Rgb>() * (FRAC_1_PI / POINTS as f32)
+/// What of E_T a receiver sends on as diffuse radiance: the mean over directions of `diffuse_out`, over π.
+fn reflectance(world: &World, r: &Receiver) -> Rgb {
+    let side = if r.back { -1.0 } else { 1.0 };
+    let out = |k: usize| {
+        let at = surface(world, r, k);
+        let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / POINTS as f32, (0.618 * k as f32 + 0.3).fract()));
+        let bsdf = &world.scene.materials[at.material as usize].bsdf;
+        bsdf.diffuse_out(&at, Vec3::new(d.x, d.y, d.z * side))
     };
-    receivers.par_iter().with_min_len(64).map(of).collect()
+    (0..POINTS).map(out).sum::<Rgb>() * (FRAC_1_PI / POINTS as f32)
 }
 
-/// All light of a frame of `world`; passes are timed as the paper does (Table 2).
-pub fn light(
-    transport: &Transport,
-    world: &World,
-    reflectance: &[Rgb],
-    params: &RadianceProbeParams,
-    seed: u32,
-    clock: &mut Clock,
-) -> Light {
-    let direct = direct(world, &transport.receivers, params.map_samples, seed);
-    clock.lap("scene relight");
-    let rows = transport.params.receiver.rows();
-    let mut indirect = vec![Rgb::ZERO; direct.len() * rows];
-    for _ in 0..params.bounces {
-        let radiance = radiance(&direct, &indirect, rows, reflectance);
-        let lambda = transport.probe_radiance(&radiance);
-        clock.lap("probe relight");
-        indirect = transport.receive(&lambda);
-        clock.lap("receivers");
+/// What lights frames: the operator, and what receivers send on.
+pub struct Lighting {
+    /// The operator.
+    pub transport: Transport,
+    /// Of each receiver, in the scene's own colours.
+    reflectance: Vec<Rgb>,
+    /// Receivers whose material changes from frame to frame.
+    changing: Vec<u32>,
+}
+
+impl Lighting {
+    /// In `world`, the scene's own; `changed`: materials that change.
+    pub fn new(world: &World, transport: Transport, changed: &[u32]) -> Self {
+        let reflectance = transport.receivers.par_iter().with_min_len(64).map(|r| reflectance(world, r)).collect();
+        let material = |r: &Receiver| world.scene.geometry.object(r.points[0].triangle).material;
+        let changes = |r: &u32| changed.binary_search(&material(&transport.receivers[*r as usize])).is_ok();
+        let changing = (0..transport.receivers.len() as u32).filter(changes).collect();
+        Self { transport, reflectance, changing }
     }
-    Light { direct, indirect }
+
+    /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2).
+    pub fn light(&self, world: &World, params: &RadianceProbeParams, seed: u32, clock: &mut Clock) -> Light {
+        let transport = &self.transport;
+        let mut reflectances = Cow::Borrowed(&self.reflectance);
+        if !self.changing.is_empty() {
+            let of = |&r: &u32| reflectance(world, &transport.receivers[r as usize]);
+            let changed: Vec<Rgb> = self.changing.par_iter().with_min_len(64).map(of).collect();
+            let all = reflectances.to_mut();
+            self.changing.iter().zip(changed).for_each(|(&r, value)| all[r as usize] = value);
+        }
+        let direct = direct(world, &transport.receivers, params.map_samples, seed);
+        clock.lap("scene relight");
+        let hits = transport.hits_in(world);
+        let rows = transport.params.receiver.rows();
+        let mut indirect = vec![Rgb::ZERO; direct.len() * rows];
+        for _ in 0..params.bounces {
+            let radiance = radiance(&direct, &indirect, rows, &reflectances);
+            let lambda = transport.probe_radiance(&hits, &radiance);
+            clock.lap("probe relight");
+            indirect = transport.receive(&lambda);
+            clock.lap("receivers");
+        }
+        Light { direct, indirect }
+    }
 }
 
 /// E_T of receivers that keep irradiance, from emitters and by way of the probes.

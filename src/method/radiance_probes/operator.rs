@@ -1,14 +1,19 @@
 //! The operator in memory, and what it makes of the probes' radiance: cluster projection and receiver reconstruction (§4.2).
 
 use super::compress::Cluster;
+use super::light::surface;
 use super::params::TransportParams;
 use super::relight::RelightRays;
+use super::seen::NO_RECEIVER;
 use crate::base::math::Rgb;
+use crate::base::ray::Ray;
 use crate::lightmap::Atlas;
 use crate::lightmap::receivers::Receiver;
+use crate::transport::World;
 use glam::Vec3;
 use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Lanes of a sum.
 const LANES: usize = 8;
@@ -34,9 +39,25 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// λ, from what the receivers send out (diffuse radiance).
-    pub fn probe_radiance(&self, radiance: &[Rgb]) -> Vec<Rgb> {
-        self.rays.project(&self.hits, radiance)
+    /// λ, from what the receivers send out (diffuse radiance). `hits`: those of [`Self::hits`] that are not blocked.
+    pub fn probe_radiance(&self, hits: &[u32], radiance: &[Rgb]) -> Vec<Rgb> {
+        self.rays.project(hits, radiance)
+    }
+
+    /// What relight rays meet in a frame's world (§5.1): shapes that it adds block them, and send out no light themselves.
+    pub fn hits_in(&self, world: &World) -> Cow<'_, [u32]> {
+        if !world.has_added() {
+            return Cow::Borrowed(&self.hits);
+        }
+        let rays = self.rays.directions.len();
+        let unblocked = |(i, &hit): (usize, &u32)| {
+            let receiver = self.receivers.get(hit as usize)?;
+            let (p, to) = (self.probes[i / rays], surface(world, receiver, 0).p);
+            let ray = Ray { t_max: p.distance(to), ..Ray::new(p, (to - p).try_normalize()?) };
+            (!world.occluded_by_added(&ray)).then_some(hit)
+        };
+        let all = self.hits.par_iter().enumerate().with_min_len(rays);
+        Cow::Owned(all.map(|entry| unblocked(entry).unwrap_or(NO_RECEIVER)).collect())
     }
 
     /// What the receivers get by way of the probes: `receiver.rows()` numbers each (Eq. 6).

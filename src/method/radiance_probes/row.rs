@@ -1,6 +1,6 @@
 //! Radiance probes in the table of methods.
 
-use super::light::{Light, as_light_map, light, reflectances};
+use super::light::{Light, Lighting, as_light_map};
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
 use crate::Result;
@@ -11,6 +11,7 @@ use crate::base::progress::Progress;
 use crate::lightmap::LightMap;
 use crate::material::bsdf::{Lobes, Query};
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
+use crate::scene::Animation;
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
@@ -25,7 +26,7 @@ pub const METHOD: Method = Method {
     about: "Sparse radiance probes: diffuse light under lights that move",
     reads: Reads { probes: Some(Probes { stage: "bake-transport", any_texel: false }), lightmap: Need::No, curvature: Need::No },
     layers: &["diffuse"],
-    options: &["probes", "supersample", "set"],
+    options: &["probes", "supersample", "lights", "set"],
     samples: None,
     transmissive: false,
     orthographic: true,
@@ -43,31 +44,26 @@ fn parameters(options: &Options) -> Result<Value> {
 }
 
 struct OnCpu<'a> {
-    world: &'a World,
-    baseline: Baseline<'a>,
-    transport: Transport,
-    reflectance: Vec<Rgb>,
+    setup: Setup<'a>,
+    lighting: Lighting,
     params: RadianceProbeParams,
-    seed: u32,
 }
 
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let params: RadianceProbeParams = setup.parameters()?;
     let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
-    let reflectance = reflectances(setup.world, &transport.receivers);
-    let baseline = Baseline::new(setup.world, None, params.supersample);
-    Ok(Box::new(OnCpu { world: setup.world, baseline, transport, reflectance, params, seed: setup.seed }))
+    let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
+    Ok(Box::new(OnCpu { setup: *setup, lighting: Lighting::new(setup.world, transport, &changed), params: setup.parameters()? }))
 }
 
 impl OnCpu<'_> {
     /// Direct light by rays, the rest from the receivers.
-    fn diffuse(&self, view: &GBuffer, indirect: &LightMap, frame: u32) -> Vec<Rgb> {
+    fn diffuse(&self, world: &World, view: &GBuffer, indirect: &LightMap, frame: u32) -> Vec<Rgb> {
         let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
         let of = |(i, p): (usize, &Option<Pixel>)| {
             let Some(p) = p else { return Rgb::ZERO };
-            let stream = hash_words(&[self.seed, frame, i as u32]);
-            direct(self.world, p, query, self.params.direct_samples, stream)
-                + indirect.diffuse_radiance(&self.world.scene, &p.surface, p.wo)
+            let stream = hash_words(&[self.setup.seed, frame, i as u32]);
+            let straight = direct(world, p, query, self.params.direct_samples, stream);
+            straight + indirect.diffuse_radiance(&world.scene, &p.surface, p.wo)
         };
         view.pixels.par_iter().enumerate().with_min_len(view.size()[0]).map(of).collect()
     }
@@ -76,19 +72,25 @@ impl OnCpu<'_> {
 impl Renderer for OnCpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
         let mut clock = Clock::start();
-        let Light { indirect, .. } = light(&self.transport, self.world, &self.reflectance, &self.params, self.seed, &mut clock);
-        let map = as_light_map(&self.transport, self.world, &indirect);
+        let of_frame = self.setup.world_at(view);
+        if of_frame.is_some() {
+            clock.lap("world");
+        }
+        let world = of_frame.as_ref().unwrap_or(self.setup.world);
+        let Light { indirect, .. } = self.lighting.light(world, &self.params, self.setup.seed, &mut clock);
+        let map = as_light_map(&self.lighting.transport, world, &indirect);
         clock.lap("light map");
-        let g = self.baseline.gbuffer(&view.camera, &mut clock);
-        let diffuse = self.diffuse(&g, &map, view.frame);
+        let baseline = Baseline::new(world, None, self.params.supersample);
+        let g = baseline.gbuffer(&view.camera, &mut clock);
+        let diffuse = self.diffuse(world, &g, &map, view.frame);
         clock.lap("diffuse");
         let glossy = vec![Rgb::ZERO; diffuse.len()];
-        let layers = self.baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
+        let layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
         progress.advance(view.camera.size[1].into());
         Ok(Frame::of(layers, clock.laps))
     }
 
     fn probe_bytes(&self) -> [u64; 2] {
-        [self.transport.bytes() as u64, 0]
+        [self.lighting.transport.bytes() as u64, 0]
     }
 }

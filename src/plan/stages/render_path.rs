@@ -10,6 +10,7 @@ use crate::method::glossy_probes::{self, GlossyProbeParams};
 use crate::method::{FilterChoice, LayerChoice, METHODS, Method, Need, Options, Renderer, Setup};
 use crate::plan::budget::{self, Budget};
 use crate::plan::frames::{Frames, render};
+use crate::plan::lights;
 use crate::plan::option::{Size, stage};
 use crate::plan::timings::Timings;
 use crate::plan::views::{FrameList, views, views_of_changes};
@@ -266,14 +267,8 @@ impl RenderPath {
             world?
         };
         let scene = &world.scene;
-        let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
-        let animation = self.lights.as_ref().map(|file| Animation::load(file, scene)).transpose()?;
-        if let (Some(file), Some(animation)) = (&self.lights, &animation) {
-            provenance = provenance.with_input("lights", hash_file(file)?);
-            for (i, mesh) in animation.files.iter().enumerate() {
-                provenance = provenance.with_input(&format!("lights.mesh{i}"), hash_file(mesh)?);
-            }
-        }
+        let provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
+        let (animation, mut provenance) = lights::load(self.lights.as_deref(), scene, provenance)?;
         if let Some(folder) = &self.probes {
             provenance = provenance.with_input("probes", set_hash(folder, method.reads.probes.map_or("", |p| p.stage))?);
             if method.reads.probes.is_some_and(|p| p.any_texel) {
