@@ -1,11 +1,14 @@
 //! A frame's light: direct light at the receivers, and what comes of it by way of the probes (§4.2).
 
+use super::harmonics::cosine_factor;
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
+use super::transport::{Kept, first_four};
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::ray::Hit;
 use crate::lightmap::LightMap;
+use crate::lightmap::fill::dilate;
 use crate::lightmap::lookup::sides;
 use crate::lightmap::receivers::{POINTS, Receiver, spread};
 use crate::material::Surface;
@@ -65,6 +68,8 @@ pub struct Lighting {
     reflectance: Vec<Rgb>,
     /// Receivers whose material changes from frame to frame.
     changing: Vec<u32>,
+    /// Where receivers that keep sh1 face; empty for others.
+    normals: Vec<Vec3>,
 }
 
 impl Lighting {
@@ -74,7 +79,10 @@ impl Lighting {
         let material = |r: &Receiver| world.scene.geometry.object(r.points[0].triangle).material;
         let changes = |r: &u32| changed.binary_search(&material(&transport.receivers[*r as usize])).is_ok();
         let changing = (0..transport.receivers.len() as u32).filter(changes).collect();
-        Self { transport, reflectance, changing }
+        let normal = |r: &Receiver| surface(world, r, 0).frame.n * if r.back { -1.0 } else { 1.0 };
+        let keeps_sh1 = transport.params.receiver == Kept::Sh1;
+        let normals = transport.receivers.iter().filter(|_| keeps_sh1).map(normal).collect();
+        Self { transport, reflectance, changing, normals }
     }
 
     /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2).
@@ -93,7 +101,7 @@ impl Lighting {
         let rows = transport.params.receiver.rows();
         let mut indirect = vec![Rgb::ZERO; direct.len() * rows];
         for _ in 0..params.bounces {
-            let radiance = radiance(&direct, &indirect, rows, &reflectances);
+            let radiance = radiance(&direct, &self.irradiance(&indirect), &reflectances);
             let lambda = transport.probe_radiance(&hits, &radiance);
             clock.lap("probe relight");
             indirect = transport.receive(&lambda);
@@ -103,32 +111,51 @@ impl Lighting {
     }
 }
 
+impl Lighting {
+    /// Irradiance of what receivers keep: of sh1, by the two factors of Ramamoorthi and Hanrahan 2001.
+    fn irradiance<'l>(&self, kept: &'l [Rgb]) -> Cow<'l, [Rgb]> {
+        if self.normals.is_empty() {
+            return Cow::Borrowed(kept);
+        }
+        let of = |(light, &n): (&[Rgb], &Vec3)| {
+            let [y0, y1 @ ..] = first_four(n);
+            let linear: Rgb = light[1..].iter().zip(y1).map(|(&l, y)| l * y).sum();
+            light[0] * (y0 * cosine_factor(0) as f32) + linear * cosine_factor(1) as f32
+        };
+        Cow::Owned(kept.par_chunks_exact(4).zip(&self.normals).map(of).collect())
+    }
+}
+
 /// E_T of receivers that keep irradiance, from emitters and by way of the probes.
 pub fn total(light: &Light) -> Vec<Rgb> {
     light.direct.iter().zip(&light.indirect).map(|(&d, i)| d + i.max(Rgb::ZERO)).collect()
 }
 
 /// Diffuse radiance that receivers send out.
-fn radiance(direct: &[Rgb], indirect: &[Rgb], rows: usize, reflectance: &[Rgb]) -> Vec<Rgb> {
-    direct
-        .par_iter()
-        .zip(indirect.par_chunks_exact(rows))
-        .zip(reflectance)
-        .map(|((d, i), &r)| (*d + i[0].max(Rgb::ZERO)) * r)
-        .collect()
+fn radiance(direct: &[Rgb], indirect: &[Rgb], reflectance: &[Rgb]) -> Vec<Rgb> {
+    direct.par_iter().zip(indirect).zip(reflectance).map(|((d, i), &r)| (*d + i.max(Rgb::ZERO)) * r).collect()
 }
 
 /// A light map of one number a receiver.
 pub fn as_light_map(transport: &Transport, world: &World, values: &[Rgb]) -> LightMap {
+    map(transport, world, values, &|image, valid| spread(&world.scene.geometry, &transport.atlas, image, valid))
+}
+
+/// The same of numbers that may be negative; the seams of charts stay as they are.
+pub fn as_signed_map(transport: &Transport, world: &World, values: &[Rgb]) -> LightMap {
+    map(transport, world, values, &|image, valid| dilate(&transport.atlas, image, valid))
+}
+
+fn map(transport: &Transport, world: &World, values: &[Rgb], fill: &dyn Fn(&mut [Rgb], &[bool])) -> LightMap {
     let pixels = (transport.atlas.size[0] * transport.atlas.size[1]) as usize;
     let side = |back: bool| {
         let (mut image, mut valid) = (vec![Rgb::ZERO; pixels], vec![false; pixels]);
         for (r, value) in transport.receivers.iter().zip(values).filter(|(r, _)| r.back == back) {
-            (image[r.pixel as usize], valid[r.pixel as usize]) = (value.max(Rgb::ZERO), true);
+            (image[r.pixel as usize], valid[r.pixel as usize]) = (*value, true);
         }
         let any = valid.contains(&true);
         if any {
-            spread(&world.scene.geometry, &transport.atlas, &mut image, &valid);
+            fill(&mut image, &valid);
         }
         any.then_some(image)
     };

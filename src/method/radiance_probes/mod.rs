@@ -17,6 +17,7 @@ pub mod relight;
 pub mod round_trip;
 mod row;
 pub mod seen;
+pub mod shade;
 pub mod store;
 #[cfg(test)]
 mod tests;

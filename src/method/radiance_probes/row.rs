@@ -1,23 +1,17 @@
 //! Radiance probes in the table of methods.
 
-use super::light::{Light, Lighting, as_light_map};
+use super::light::Lighting;
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
+use super::shade::{Indirect, Shading};
 use crate::Result;
 use crate::base::clock::Clock;
-use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
-use crate::lightmap::LightMap;
-use crate::material::bsdf::{Lobes, Query};
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
 use crate::scene::Animation;
-use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
-use crate::view::direct::direct;
-use crate::view::gbuffer::{GBuffer, Pixel};
-use rayon::prelude::*;
 use serde_json::Value;
 
 /// The row.
@@ -25,7 +19,7 @@ pub const METHOD: Method = Method {
     name: "radiance-probes",
     about: "Sparse radiance probes: diffuse light under lights that move",
     reads: Reads { probes: Some(Probes { stage: "bake-transport", any_texel: false }), lightmap: Need::No, curvature: Need::No },
-    layers: &["diffuse"],
+    layers: &["diffuse", "glossy"],
     options: &["probes", "supersample", "lights", "set"],
     samples: None,
     transmissive: false,
@@ -55,20 +49,6 @@ fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     Ok(Box::new(OnCpu { setup: *setup, lighting: Lighting::new(setup.world, transport, &changed), params: setup.parameters()? }))
 }
 
-impl OnCpu<'_> {
-    /// Direct light by rays, the rest from the receivers.
-    fn diffuse(&self, world: &World, view: &GBuffer, indirect: &LightMap, frame: u32) -> Vec<Rgb> {
-        let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
-        let of = |(i, p): (usize, &Option<Pixel>)| {
-            let Some(p) = p else { return Rgb::ZERO };
-            let stream = hash_words(&[self.setup.seed, frame, i as u32]);
-            let straight = direct(world, p, query, self.params.direct_samples, stream);
-            straight + indirect.diffuse_radiance(&world.scene, &p.surface, p.wo)
-        };
-        view.pixels.par_iter().enumerate().with_min_len(view.size()[0]).map(of).collect()
-    }
-}
-
 impl Renderer for OnCpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
         let mut clock = Clock::start();
@@ -77,14 +57,16 @@ impl Renderer for OnCpu<'_> {
             clock.lap("world");
         }
         let world = of_frame.as_ref().unwrap_or(self.setup.world);
-        let Light { indirect, .. } = self.lighting.light(world, &self.params, self.setup.seed, &mut clock);
-        let map = as_light_map(&self.lighting.transport, world, &indirect);
+        let light = self.lighting.light(world, &self.params, self.setup.seed, &mut clock);
+        let indirect = Indirect::new(&self.lighting.transport, world, &light);
         clock.lap("light map");
         let baseline = Baseline::new(world, None, self.params.supersample);
         let g = baseline.gbuffer(&view.camera, &mut clock);
-        let diffuse = self.diffuse(world, &g, &map, view.frame);
+        let shading = Shading { world, indirect: &indirect, params: &self.params, seed: self.setup.seed, frame: view.frame };
+        let diffuse = shading.diffuse(&g);
         clock.lap("diffuse");
-        let glossy = vec![Rgb::ZERO; diffuse.len()];
+        let glossy = shading.glossy(&g);
+        clock.lap("glossy");
         let layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
         progress.advance(view.camera.size[1].into());
         Ok(Frame::of(layers, clock.laps))

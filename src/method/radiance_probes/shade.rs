@@ -1,0 +1,136 @@
+//! The layers of a view that radiance probes light (§4.2, §5.1).
+
+use super::light::{Light, as_light_map, as_signed_map};
+use super::operator::Transport;
+use super::params::RadianceProbeParams;
+use super::transport::{Kept, first_four};
+use crate::base::math::{Basis, Rgb, hash_words, luminance};
+use crate::lightmap::LightMap;
+use crate::material::bsdf::warp::cosine_hemisphere;
+use crate::material::bsdf::{Lobes, Query};
+use crate::transport::World;
+use crate::view::direct::direct;
+use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::{FRAC_1_PI, PI};
+
+/// Directions by which light of first order is taken in.
+const DIRECTIONS: u32 = 16;
+
+/// Branches of a pixel's random stream: direct light of either layer.
+const BRANCHES: [u32; 2] = [1, 2];
+
+/// Light that comes by way of the probes, where pixels look it up.
+pub enum Indirect {
+    /// E_T.
+    Irradiance(LightMap),
+    /// The four harmonics of radiance.
+    Radiance(Box<[LightMap; 4]>),
+}
+
+impl Indirect {
+    /// Of a frame's light.
+    pub fn new(transport: &Transport, world: &World, light: &Light) -> Self {
+        match transport.params.receiver {
+            Kept::Irradiance => Self::Irradiance(as_light_map(transport, world, &light.indirect)),
+            Kept::Sh1 => {
+                let number = |k: usize| light.indirect.iter().skip(k).step_by(4).copied().collect::<Vec<Rgb>>();
+                Self::Radiance(Box::new([0, 1, 2, 3].map(|k| as_signed_map(transport, world, &number(k)))))
+            }
+        }
+    }
+}
+
+/// What a view is made of.
+pub struct Shading<'a> {
+    /// The frame's world.
+    pub world: &'a World,
+    /// Light by way of the probes.
+    pub indirect: &'a Indirect,
+    /// How.
+    pub params: &'a RadianceProbeParams,
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// Frame of the path.
+    pub frame: u32,
+}
+
+impl Shading<'_> {
+    /// The diffuse layer, linear radiance.
+    pub fn diffuse(&self, view: &GBuffer) -> Vec<Rgb> {
+        let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
+        self.layer(view, |p, stream| {
+            let scene = &self.world.scene;
+            let straight = direct(self.world, p, query, self.params.direct_samples, hash_words(&[stream, BRANCHES[0]]));
+            straight
+                + match self.indirect {
+                    Indirect::Irradiance(map) => map.diffuse_radiance(scene, &p.surface, p.wo),
+                    Indirect::Radiance(maps) => self.taken_in(p, &looked_up(maps, p)),
+                }
+        })
+    }
+
+    /// The glossy layer: direct light, and where receivers keep sh1 the linear terms of theirs as one distant light (§5.1, after Sloan 2008).
+    pub fn glossy(&self, view: &GBuffer) -> Vec<Rgb> {
+        self.layer(view, |p, stream| {
+            if p.alpha.is_none() {
+                return Rgb::ZERO;
+            }
+            let straight = direct(self.world, p, GLOSSY, self.params.direct_samples, hash_words(&[stream, BRANCHES[1]]));
+            straight
+                + match self.indirect {
+                    Indirect::Irradiance(_) => Rgb::ZERO,
+                    Indirect::Radiance(maps) => self.reflected(p, &looked_up(maps, p)),
+                }
+        })
+    }
+
+    fn layer(&self, view: &GBuffer, of: impl Fn(&Pixel, u32) -> Rgb + Sync) -> Vec<Rgb> {
+        let pixel = |(i, pixel): (usize, &Option<Pixel>)| {
+            let stream = hash_words(&[self.seed, self.frame, i as u32]);
+            pixel.as_ref().map_or(Rgb::ZERO, |p| of(p, stream))
+        };
+        view.pixels.par_iter().enumerate().with_min_len(view.size()[0]).map(pixel).collect()
+    }
+
+    /// Diffuse reflection of light of first order. *Ours*: by directions in place of the two factors of Ramamoorthi and Hanrahan 2001, so that
+    /// coats, bump and normal maps have their part.
+    fn taken_in(&self, p: &Pixel, light: &[Rgb; 4]) -> Rgb {
+        let bsdf = &self.world.scene.materials[p.surface.material as usize].bsdf;
+        let out = bsdf.diffuse_out(&p.surface, p.surface.frame.to_local(p.wo));
+        if out == Rgb::ZERO {
+            return Rgb::ZERO;
+        }
+        let frame = Basis::from_normal(p.normal);
+        let from = |i: u32| {
+            let u = Vec2::new((i as f32 + 0.5) / DIRECTIONS as f32, (0.618_034 * (i as f32 + 0.5)).fract());
+            let d = frame.to_world(cosine_hemisphere(u));
+            radiance(light, d) * bsdf.diffuse_in(&p.surface, p.surface.frame.to_local(d))
+        };
+        let taken: Rgb = (0..DIRECTIONS).map(from).sum::<Rgb>() * (PI / DIRECTIONS as f32);
+        out * taken.max(Rgb::ZERO) * FRAC_1_PI
+    }
+
+    fn reflected(&self, p: &Pixel, light: &[Rgb; 4]) -> Rgb {
+        let [_, y, z, x] = light.map(luminance);
+        let Some(d) = Vec3::new(x, y, z).try_normalize() else { return Rgb::ZERO };
+        // A distant light of irradiance c has the terms c Y_j(d): c by least squares over the linear ones.
+        let [_, y1 @ ..] = first_four(d);
+        let irradiance = light[1..].iter().zip(y1).map(|(&l, y)| l * y).sum::<Rgb>() / (0.75 * FRAC_1_PI);
+        let bsdf = &self.world.scene.materials[p.surface.material as usize].bsdf;
+        let local = |w: Vec3| p.surface.frame.to_local(w);
+        let (value, _) = bsdf.eval_pdf(&p.surface, local(p.wo), local(d), GLOSSY);
+        value * irradiance.max(Rgb::ZERO)
+    }
+}
+
+/// Radiance of an expansion of first order from a direction.
+fn radiance(light: &[Rgb; 4], d: Vec3) -> Rgb {
+    light.iter().zip(first_four(d)).map(|(&l, y)| l * y).sum()
+}
+
+fn looked_up(maps: &[LightMap; 4], p: &Pixel) -> [Rgb; 4] {
+    let back = p.surface.frame.n.dot(p.wo) < 0.0;
+    [0, 1, 2, 3].map(|k: usize| maps[k].lookup(p.surface.triangle, p.surface.barycentric, back))
+}
