@@ -55,24 +55,38 @@ impl Harmonics {
 
     /// Writes Y_j(d) of all of them; `d` unit.
     pub fn evaluate(&self, d: Vec3, y: &mut [f32]) {
+        let mut lanes = [[0.0]; MAX_TERMS];
+        self.evaluate_lanes([[d.x], [d.y], [d.z]], &mut lanes);
+        y.iter_mut().zip(&lanes[..self.terms()]).for_each(|(y, [lane])| *y = *lane);
+    }
+
+    /// Writes Y_j of `N` unit directions at once, given by their coordinates.
+    pub fn evaluate_lanes<const N: usize>(&self, [x, y, z]: [[f32; N]; 3], out: &mut [[f32; N]]) {
         let mut steps = self.steps.iter();
         // r^m cos(mφ) and r^m sin(mφ), r = sin θ.
-        let (mut cos, mut sin) = (1.0, 0.0);
+        let (mut cos, mut sin) = ([1.0; N], [0.0; N]);
         for m in 0..=self.order {
-            let (mut below, mut p) = (0.0, self.diagonal[m]);
-            let mut put = |l: usize, p: f32| {
-                y[l * l + l + m] = p * cos;
+            let (mut below, mut p) = ([0.0; N], [self.diagonal[m]; N]);
+            let mut put = |l: usize, p: &[f32; N]| {
+                for k in 0..N {
+                    out[l * l + l + m][k] = p[k] * cos[k];
+                }
                 // Of m = 0 the same place once more, as sin is 0 there and must not be written.
                 if m > 0 {
-                    y[l * l + l - m] = p * sin;
+                    for k in 0..N {
+                        out[l * l + l - m][k] = p[k] * sin[k];
+                    }
                 }
             };
-            put(m, p);
+            put(m, &p);
             for (l, [a, b]) in (m + 1..=self.order).zip(&mut steps) {
-                (below, p) = (p, a * (d.z * p - b * below));
-                put(l, p);
+                let next: [f32; N] = std::array::from_fn(|k| a * (z[k] * p[k] - b * below[k]));
+                (below, p) = (p, next);
+                put(l, &p);
             }
-            (cos, sin) = (cos * d.x - sin * d.y, sin * d.x + cos * d.y);
+            let turned: [[f32; N]; 2] =
+                [std::array::from_fn(|k| cos[k] * x[k] - sin[k] * y[k]), std::array::from_fn(|k| sin[k] * x[k] + cos[k] * y[k])];
+            [cos, sin] = turned;
         }
     }
 

@@ -132,12 +132,10 @@ impl Gather {
         let reach = |p: Vec3| weight(x.distance(p) / ground.radius);
         let support: Vec<(u32, f32)> =
             ground.probes.iter().enumerate().map(|(i, &p)| (i as u32, reach(p))).filter(|(_, w)| *w > 0.0).collect();
-        let (terms, kinds) = (self.terms(), self.kept.rows());
-        let mut values = vec![0.0; kinds * support.len() * terms];
+        let mut sums = Sums::new(self.kept.rows(), support.len(), self.terms());
         let back = ground.receivers.list[receiver as usize].back;
         let bsdf = &ground.world.scene.materials[surfaces[0].material as usize].bsdf;
-        let mut y = [0.0; MAX_TERMS];
-        let mut parts: Vec<Part> = Vec::with_capacity(support.len());
+        let mut parts = Parts::new(support.len());
         for (k, &local) in self.directions.iter().enumerate() {
             let surface = &surfaces[k % POINTS];
             let normal = surface.frame.n * if back { -1.0 } else { 1.0 };
@@ -145,37 +143,25 @@ impl Gather {
             if d.dot(facing(surface, back)) <= 0.0 {
                 continue;
             }
-            parts.clear();
             self.parts(ground, surface, d, &support, &mut parts);
-            let sum: f32 = parts.iter().map(|p| p.weight).sum();
+            let sum: f32 = parts.weights.iter().flatten().sum();
             if sum <= 0.0 {
                 continue;
             }
-            let mut measure = [0.0; 4];
-            match self.kept {
-                Kept::Irradiance => measure[0] = PI * bsdf.diffuse_in(surface, surface.frame.to_local(d)),
-                Kept::Sh1 => measure = first_four(d).map(|y| TAU * y),
-            }
+            let measure = match self.kept {
+                Kept::Irradiance => [PI * bsdf.diffuse_in(surface, surface.frame.to_local(d)), 0.0, 0.0, 0.0],
+                Kept::Sh1 => first_four(d).map(|y| TAU * y),
+            };
             let share = 1.0 / (sum * self.directions.len() as f32);
-            for part in &parts {
-                self.harmonics.evaluate(part.towards, &mut y);
-                for (row, m) in measure[..kinds].iter().enumerate() {
-                    let factor = m * part.weight * share;
-                    let at = (row * support.len() + part.slot) * terms;
-                    for (value, y) in values[at..at + terms].iter_mut().zip(&y) {
-                        *value += factor * y;
-                    }
-                }
-            }
+            sums.add(&self.harmonics, &parts, &measure.map(|m| m * share));
         }
-        Row { probes: support.iter().map(|s| s.0).collect(), values }
+        Row { probes: support.iter().map(|s| s.0).collect(), values: sums.rows(support.len()) }
     }
 
     /// What the probes of a support have to say of the ray from `surface` along `d`.
-    fn parts(&self, ground: &Ground, surface: &Surface, d: Vec3, support: &[(u32, f32)], parts: &mut Vec<Part>) {
-        let plain = |parts: &mut Vec<Part>| {
-            parts.extend(support.iter().enumerate().map(|(slot, &(_, weight))| Part { slot, weight, towards: d }));
-        };
+    fn parts(&self, ground: &Ground, surface: &Surface, d: Vec3, support: &[(u32, f32)], parts: &mut Parts) {
+        parts.weights.fill([0.0; LANES]);
+        let plain = |parts: &mut Parts| support.iter().enumerate().for_each(|(slot, &(_, weight))| parts.set(slot, weight, d));
         if self.interpolation == Interpolation::Spatial {
             return plain(parts);
         }
@@ -184,23 +170,82 @@ impl Gather {
             return plain(parts);
         }
         let Some(seen) = ground.receivers.at(&hit, -d).map(|r| ground.seen(r)) else { return };
-        parts.extend(support.iter().enumerate().filter(|(_, (i, _))| seen[*i as usize] > 0).filter_map(
-            |(slot, &(i, weight))| {
-                let towards = (hit.p - ground.probes[i as usize]).try_normalize()?;
-                Some(Part { slot, weight: weight * f32::from(seen[i as usize]), towards })
-            },
-        ));
+        for (slot, &(i, weight)) in support.iter().enumerate().filter(|(_, (i, _))| seen[*i as usize] > 0) {
+            if let Some(towards) = (hit.p - ground.probes[i as usize]).try_normalize() {
+                parts.set(slot, weight * f32::from(seen[i as usize]), towards);
+            }
+        }
     }
 }
 
-/// A probe's part in the light along a ray.
-struct Part {
-    /// Place of the probe in the support.
-    slot: usize,
+/// Probes that are worked on side by side.
+const LANES: usize = 8;
+
+/// The part of each probe of a support in the light along a ray, in groups of [`LANES`].
+struct Parts {
     /// w_i V_i.
-    weight: f32,
+    weights: Vec<[f32; LANES]>,
     /// ψ_i.
-    towards: Vec3,
+    towards: Vec<[[f32; LANES]; 3]>,
+}
+
+impl Parts {
+    fn new(probes: usize) -> Self {
+        let groups = probes.div_ceil(LANES);
+        Self { weights: vec![[0.0; LANES]; groups], towards: vec![[[0.0; LANES]; 3]; groups] }
+    }
+
+    fn set(&mut self, slot: usize, weight: f32, towards: Vec3) {
+        let (group, lane) = (slot / LANES, slot % LANES);
+        self.weights[group][lane] = weight;
+        for (axis, lanes) in self.towards[group].iter_mut().enumerate() {
+            lanes[lane] = towards[axis];
+        }
+    }
+}
+
+/// A row in the making: of each number that is kept and each group of probes, the harmonics.
+struct Sums {
+    kinds: usize,
+    terms: usize,
+    values: Vec<[f32; LANES]>,
+}
+
+impl Sums {
+    fn new(kinds: usize, probes: usize, terms: usize) -> Self {
+        Self { kinds, terms, values: vec![[0.0; LANES]; kinds * probes.div_ceil(LANES) * terms] }
+    }
+
+    /// Adds a ray, `measure` times what it brings.
+    fn add(&mut self, harmonics: &Harmonics, parts: &Parts, measure: &[f32; 4]) {
+        let mut y = [[0.0; LANES]; MAX_TERMS];
+        for (group, (weights, towards)) in parts.weights.iter().zip(&parts.towards).enumerate() {
+            if weights.iter().all(|&w| w == 0.0) {
+                continue;
+            }
+            harmonics.evaluate_lanes(*towards, &mut y);
+            for (kind, m) in measure[..self.kinds].iter().enumerate() {
+                let factors = weights.map(|w| w * m);
+                let at = (kind * parts.weights.len() + group) * self.terms;
+                for (sum, y) in self.values[at..at + self.terms].iter_mut().zip(&y) {
+                    for k in 0..LANES {
+                        sum[k] += factors[k] * y[k];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Number by number, probe by probe, harmonic by harmonic.
+    fn rows(&self, probes: usize) -> Vec<f32> {
+        let groups = probes.div_ceil(LANES);
+        let value =
+            |kind: usize, slot: usize, j: usize| self.values[(kind * groups + slot / LANES) * self.terms + j][slot % LANES];
+        let all = (0..self.kinds).flat_map(|kind| (0..probes).map(move |slot| (kind, slot)));
+        all.flat_map(|(kind, slot)| (0..self.terms).map(move |j| (kind, slot, j)))
+            .map(|(kind, slot, j)| value(kind, slot, j))
+            .collect()
+    }
 }
 
 /// The harmonics up to order 1.
