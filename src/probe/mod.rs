@@ -1,5 +1,6 @@
-//! What every kind of probe shares: where probes stand ([`places`]: on a grid, [`placement`] and [`reach`]; or on a scene's skeleton,
-//! [`nonuniform`]: [`skeleton`], [`clip`], [`coverage`], [`select`], [`refine`], [`plan_picture`], [`coverage_picture`]; their weights: [`neighbors`]), how directions and texels belong together
+//! What every kind of probe shares: where probes stand ([`places`]: on a grid, [`placement`] and [`reach`]; on a scene's skeleton,
+//! [`nonuniform`]: [`skeleton`], [`clip`], [`coverage`], [`select`], [`refine`], [`plan_picture`], [`coverage_picture`]; or evenly along its surfaces, [`sparse`]: [`thin`];
+//! their weights: [`neighbors`], [`support`]), how directions and texels belong together
 //! ([`parameter_map`], [`mesh_inverse`]; [`octahedral`]), what a texel holds ([`file`]), and folders of them ([`set`], [`store`]).
 
 pub mod clip;
@@ -21,4 +22,7 @@ pub mod refine;
 pub mod select;
 pub mod set;
 pub mod skeleton;
+pub mod sparse;
 pub mod store;
+pub mod support;
+pub mod thin;
