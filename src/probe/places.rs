@@ -198,7 +198,12 @@ mod tests {
         assert_eq!(places, Places::Grid(grid));
 
         let positions = vec![[0.1, 0.2, 0.3], [1.0, 2.0, 3.0]];
-        let list = ProbeList { method: Placement::MedialAxis, positions: positions.clone(), radius: None, provenance: provenance.clone() };
+        let list = ProbeList {
+            method: Placement::MedialAxis,
+            positions: positions.clone(),
+            radius: None,
+            provenance: provenance.clone(),
+        };
         list.write(&path).unwrap();
         let places = Places::read(&path).unwrap();
         assert_eq!(places.positions()[1], Vec3::new(1.0, 2.0, 3.0));
@@ -219,7 +224,7 @@ mod tests {
             ("voxel", "grid", "missing field `origin`"),
             ("0.75", "-0.5", "radius -0.5: expected a positive number of metres"),
             ("0.75", "0.0", "radius 0: expected a positive number"),
-            ("0.75", "1e60", "radius inf: expected a positive number"),
+            ("0.75", "1e60", "number out of range"),
             ("0.1", "1e99", "probes.json"),
             ("\"positions\"", "\"places\"", "missing field `positions`"),
             ("[\n    [", "[], \"x\": [\n    [", "0 positions, expected from 1"),

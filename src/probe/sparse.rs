@@ -3,11 +3,12 @@
 //! *Paper*: the scene is voxelised, its empty interior flood-filled; empty voxels with non-empty neighbours are candidates, and those in the densest
 //! regions are removed until as many are left as a regular grid of the same spacing has points. *Reading*: that grid is the one of
 //! `--method grid`, in the same box. *Ours*: the fill starts at the cameras and goes by free lines of sight ([`Space`]); "next to a surface" is
-//! told by distance, so that walls just outside of the box count too.
+//! told by distance, so that walls just outside of the box count too; and probes are moved a little to where more is seen ([`super::shift`]).
 
-use super::coverage::{Row, Side};
+use super::coverage::{Row, Sides};
 use super::nonuniform::Reachable;
 use super::placement::{Density, PROBES_MAX, cells};
+use super::shift::{Watch, shift};
 use super::skeleton::space::Space;
 use super::support::{OVERLAP, mean_overlap, radius};
 use super::thin::thin;
@@ -76,6 +77,8 @@ pub struct Sparse {
     pub candidates: usize,
     /// Share of the reachable surfaces that is under a probe's support.
     pub supported: f64,
+    /// Share of them that a probe would see if none had moved.
+    pub before: f64,
     /// Share of them that a probe sees.
     pub seen: f64,
 }
@@ -86,32 +89,39 @@ pub struct Sparse {
 /// There is no empty voxel.
 pub fn place(world: &World, reachable: &Reachable, params: &SparseParams, progress: &dyn Progress) -> Result<Sparse> {
     let sides = &reachable.sides;
-    progress.start("placing", 3);
+    progress.start("placing", 2);
     let candidates = candidates(&reachable.space);
     if candidates.is_empty() {
         return Err(Error::Request("no voxel of the free space is empty: give another --path or --bounds".into()));
     }
     let left = thin(&candidates, params.spacing, params.count as usize);
     let positions: Vec<Vec3> = left.into_iter().map(|i| candidates[i]).collect();
+    let mut watch = Watch { rows: sides.rows(world, &positions), positions };
     progress.advance(1);
+    let before = share(sides, |i| watch.rows.iter().any(|row| row[i / 64] >> (i % 64) & 1 == 1));
+    shift(world, sides, &candidates, params.spacing, &mut watch);
+    progress.advance(1);
+    let Watch { positions, rows } = watch;
     let receivers: Vec<Vec3> = sides.list.iter().map(|side| side.p).collect();
     let radius = radius(&positions, &receivers, params.overlap);
-    progress.advance(1);
-    let rows = sides.rows(world, &positions);
-    progress.finish();
-    let is_supported = |side: &Side| positions.iter().any(|p| p.distance(side.p) < radius);
-    let share = |area: f64| area / sides.area;
-    let area = |is_in: &dyn Fn(usize) -> bool| (0..sides.list.len()).filter(|&i| is_in(i)).map(|i| f64::from(sides.list[i].area)).sum();
     let times = sides.times_seen(&rows);
+    progress.finish();
     Ok(Sparse {
-        overlap: mean_overlap(&positions, &receivers, radius),
         candidates: candidates.len(),
-        supported: share(area(&|i| is_supported(&sides.list[i]))),
-        seen: share(area(&|i| times[i] > 0)),
+        radius,
+        overlap: mean_overlap(&positions, &receivers, radius),
+        supported: share(sides, |i| positions.iter().any(|p| p.distance(receivers[i]) < radius)),
+        before,
+        seen: share(sides, |i| times[i] > 0),
         positions,
         rows,
-        radius,
     })
+}
+
+/// Share of the area that is of sides for which something holds.
+fn share(sides: &Sides, holds: impl Fn(usize) -> bool) -> f64 {
+    let area = |i: usize| f64::from(sides.list[i].area);
+    (0..sides.list.len()).filter(|&i| holds(i)).map(area).sum::<f64>() / sides.area
 }
 
 /// Middles of empty voxels next to non-empty ones; of all empty voxels, where no surface is near any.

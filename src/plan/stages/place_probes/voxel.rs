@@ -1,14 +1,14 @@
 //! `place-probes --method voxel`.
 
 use super::{Ground, PlaceProbes, percent};
+use crate::Result;
 use crate::base::clock::seconds;
 use crate::plan::{Context, Outcome};
 use crate::probe::nonuniform::{NonuniformParams, Reachable};
 use crate::probe::placement::{Density, Placement};
 use crate::probe::places::ProbeList;
-use crate::probe::sparse::{COUNT, SparseParams, place};
+use crate::probe::sparse::{COUNT, Sparse, SparseParams, place};
 use crate::transport::World;
-use crate::{Result, probe::sparse::Sparse};
 use serde_json::json;
 
 impl PlaceProbes {
@@ -43,7 +43,7 @@ impl PlaceProbes {
 
     fn report(&self, ground: &Ground, params: &SparseParams, placed: &Sparse, seconds: f64) -> Outcome {
         let (count, (lower, upper)) = (placed.positions.len(), ground.bounds.filled);
-        let Sparse { candidates, radius, overlap, supported, seen, .. } = *placed;
+        let Sparse { candidates, radius, overlap, supported, before, seen, .. } = *placed;
         Outcome {
             summary: format!(
                 "{}: {count} probes of {candidates} candidates (voxel, spacing {:.3} m), support radius {radius:.3} m; of the reachable \
@@ -55,7 +55,7 @@ impl PlaceProbes {
             ),
             figures: json!({
                 "method": Placement::Voxel, "count": count, "candidates": candidates, "spacing": params.spacing, "radius": radius,
-                "overlap": overlap, "supported": supported, "seen": seen, "seconds": seconds,
+                "overlap": overlap, "supported": supported, "before": before, "seen": seen, "seconds": seconds,
                 "bounds": [lower.to_array(), upper.to_array()],
             }),
             ..Outcome::default()
