@@ -198,7 +198,7 @@ fn sparse_probes_stand_evenly_in_the_room_and_say_how_far_they_reach() {
     // The room is 4 x 2 x 3 m.
     let more = ["--spacing", "1", "--picture", "plan.png", "--coverage-picture", "coverage.png"];
     let figures = place("1", "a.json", &more);
-    place("2", "b.json", &more);
+    place("2", "b.json", &more[..2]);
     assert!(read("a.json") == read("b.json"));
     assert!(read("plan.png").starts_with(b"\x89PNG") && read("coverage.png").starts_with(b"\x89PNG"));
     let number = |name: &str| figures[name].as_f64().unwrap();

@@ -13,7 +13,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-/// Unseen sides for which candidates are looked for.
+/// Unseen sides for which candidates are looked for, evenly among all.
 const SIDES: usize = 512;
 /// Most candidates that are looked through from.
 const PLACES: usize = 128;
@@ -59,15 +59,20 @@ pub fn shift(world: &World, sides: &Sides, candidates: &[Vec3], reach: f32, watc
 
 /// The sides that so many probes see.
 fn seen_by(sides: &Sides, times: &[u32], count: u32) -> Row {
+    row_of(sides, (0..times.len()).filter(|&i| times[i] == count))
+}
+
+fn row_of(sides: &Sides, list: impl Iterator<Item = usize>) -> Row {
     let mut row = sides.no_row();
-    (0..times.len()).filter(|&i| times[i] == count).for_each(|i| row[i / 64] |= 1 << (i % 64));
+    list.for_each(|i| row[i / 64] |= 1 << (i % 64));
     row
 }
 
-/// Candidates that together see all of the unseen sides that any of them sees, those that see most of it first.
+/// Candidates that together see all of some of the unseen sides, so far as any of them sees it; those that see most first.
 fn places((world, sides): (&World, &Sides), candidates: &[Vec3], reach: f32, unseen: &Row) -> Vec<Vec3> {
     let tree = Nearest::new(candidates.iter().copied());
-    let list: Vec<usize> = bits(unseen.iter().copied()).collect();
+    let all: Vec<usize> = bits(unseen.iter().copied()).collect();
+    let list: Vec<usize> = all.iter().copied().step_by(all.len().div_ceil(SIDES).max(1)).collect();
     let near = |side: &Side| {
         let near = |p: Vec3| {
             // Within reach first: a ray takes longer.
@@ -79,17 +84,12 @@ fn places((world, sides): (&World, &Sides), candidates: &[Vec3], reach: f32, uns
         };
         [side.p, side.witness].into_iter().filter_map(near).collect::<Vec<_>>()
     };
-    let step = list.len().div_ceil(SIDES).max(1);
-    let found: Vec<usize> = list.par_iter().step_by(step).flat_map_iter(|&i| near(&sides.list[i])).collect();
+    let found: Vec<usize> = list.par_iter().flat_map_iter(|&i| near(&sides.list[i])).collect();
     let found: Vec<usize> = found.into_iter().collect::<BTreeSet<_>>().into_iter().collect();
-    let row = |&c: &usize| {
-        let mut row = sides.no_row();
-        let seen = list.iter().filter(|&&i| sides.list[i].seen_from(world, candidates[c]).is_some());
-        seen.for_each(|&i| row[i / 64] |= 1 << (i % 64));
-        row
-    };
-    let rows: Vec<Row> = found.par_iter().map(row).collect();
-    let (mut left, mut wanted, mut places) = (vec![true; found.len()], unseen.clone(), Vec::new());
+    let row = |c: usize| row_of(sides, list.iter().copied().filter(|&i| sides.list[i].seen_from(world, candidates[c]).is_some()));
+    let rows: Vec<Row> = found.par_iter().map(|&c| row(c)).collect();
+    let mut wanted = row_of(sides, list.iter().copied());
+    let (mut left, mut places) = (vec![true; found.len()], Vec::new());
     while places.len() < PLACES
         && let Some(c) = best(sides, &rows, &left, &wanted)
     {
