@@ -32,7 +32,9 @@ pub struct Watch {
 /// Moves probes to some of `candidates`, each no farther than `reach` metres.
 pub fn shift(world: &World, sides: &Sides, candidates: &[Vec3], reach: f32, watch: &mut Watch) {
     let mut times = sides.times_seen(&watch.rows);
-    let places = places((world, sides), candidates, reach, &seen_by(sides, &times, 0));
+    let in_reach = |c: &&Vec3| watch.positions.iter().any(|p| p.distance(**c) <= reach);
+    let candidates: Vec<Vec3> = candidates.iter().filter(in_reach).copied().collect();
+    let places = places((world, sides), &candidates, reach, &seen_by(sides, &times, 0));
     let views = sides.rows(world, &places);
     loop {
         let (none, one) = (seen_by(sides, &times, 0), seen_by(sides, &times, 1));

@@ -110,14 +110,14 @@ fn no_probe_is_in_a_solid_and_every_surface_is_supported() {
 }
 
 #[test]
-fn probes_move_no_farther_than_they_may_to_where_they_see_more() {
+fn probes_move_to_candidates_where_they_see_more() {
     let world = room();
     let reachable = free(&world, ROOM);
     let (sides, candidates) = (&reachable.sides, candidates(&reachable.space));
-    // Two of them, neither of which sees behind the box or under the sheet.
-    let start = [Vec3::new(-1.0, 0.3, 1.2), Vec3::new(-1.2, 0.8, 0.5)];
+    // Two of them almost in one place, neither of which sees behind the box.
+    let start = [Vec3::new(0.0, 0.6, 1.2), Vec3::new(0.1, 0.6, 1.2)];
     let (mut last, mut first) = (0.0, 0.0);
-    for reach in [0.0, 0.5, 1.5] {
+    for reach in [0.0, 0.5, 3.0] {
         let mut watch = Watch { positions: start.to_vec(), rows: sides.rows(&world, &start) };
         shift(&world, sides, &candidates, reach, &mut watch);
         assert_eq!(watch.rows, sides.rows(&world, &watch.positions));
@@ -130,11 +130,11 @@ fn probes_move_no_farther_than_they_may_to_where_they_see_more() {
             assert_eq!(watch.positions, start);
             assert!((0.5..0.95).contains(&seen) && bits(union.into_iter()).count() > 100, "{seen}");
         }
-        if reach == 0.5 {
-            assert!(watch.positions.iter().all(|p| start.contains(p) || candidates.contains(p)), "{:?}", watch.positions);
+        for p in &watch.positions {
+            assert!(start.contains(p) || candidates.contains(p), "{p}");
         }
     }
-    assert!(last > first + 0.03, "{last} after {first}");
+    assert!(last > first + 0.02, "{last} after {first}");
 }
 
 #[test]
