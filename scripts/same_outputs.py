@@ -62,6 +62,7 @@ def stages(scene, path, out):
         frames("image-space-gather", *views, "--method", "image-space-gather", *light, "--samples", "16"),
         frames("lightmap-rt", *views, "--method", "lightmap-rt", *light, "--samples", "2"),
         ["place-probes", scene, "--method", "sdf", "--count", "3", "--refine", "1", "--path", path, "-o", f"{out}/places.json"],
+        ["place-probes", scene, "--method", "voxel", "--count", "12", "--path", path, "-o", f"{out}/sparse.json"],
         ["bake-lightfield", scene, "--probes", f"{out}/probes.json", "--size", "64", "--spp", "2", "-o", f"{out}/lightfield-grid"],
         ["bake-lightfield", scene, "--probes", f"{out}/places.json", "--size", "64", "--spp", "2", "-o", f"{out}/lightfield"],
         frames("light-field-grid", *views, "--method", "light-field-probes", "--probes", f"{out}/lightfield-grid", "--samples", "2", "--trace", "two-scale"),

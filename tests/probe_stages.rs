@@ -186,6 +186,38 @@ fn probes_off_the_grid_are_in_the_room_the_same_for_any_threads_and_serve_other_
 }
 
 #[test]
+fn sparse_probes_stand_evenly_in_the_room_and_say_how_far_they_reach() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("scene.xml"), scene("")).unwrap();
+    let place = |threads: &str, output: &str, more: &[&str]| {
+        let args = ["place-probes", "scene.xml", "--method", "voxel", "--threads", threads, "--json", "-o", output];
+        succeeds(folder, &[&args[..], more].concat())
+    };
+    let read = |name: &str| std::fs::read(folder.join(name)).unwrap();
+    // The room is 4 x 2 x 3 m.
+    let more = ["--spacing", "1", "--picture", "plan.png", "--coverage-picture", "coverage.png"];
+    let figures = place("1", "a.json", &more);
+    place("2", "b.json", &more[..2]);
+    assert!(read("a.json") == read("b.json"));
+    assert!(read("plan.png").starts_with(b"\x89PNG") && read("coverage.png").starts_with(b"\x89PNG"));
+    let number = |name: &str| figures[name].as_f64().unwrap();
+    assert_eq!((number("count"), number("supported")), (24.0, 1.0), "{figures}");
+    assert!(number("candidates") > 5000.0 && number("seen") > 0.97 && number("seconds") > 0.0, "{figures}");
+    let places = Places::read(&folder.join("a.json")).unwrap();
+    assert_eq!((places.method(), places.len()), (Placement::Voxel, 24));
+    assert!((places.radius().unwrap() - number("radius") as f32).abs() < 1e-6 && (1.0..3.0).contains(&number("radius")));
+    for p in places.positions() {
+        assert!(p.abs().cmplt(Vec3::new(2.2, 1.0, 1.5)).all(), "{p} is outside");
+        assert!((p - Vec3::new(1.0, -0.5, 0.0)).abs().max_element() > 0.5, "{p} is in the box");
+    }
+    // Other stages take them, and leave the radius alone.
+    assert_eq!(place("2", "few.json", &["--count", "2"])["count"], 2);
+    succeeds(folder, &["resmap", "scene.xml", "--probes", "few.json", "--size", "32x16", "-o", "r"]);
+    assert!(reprobe(folder, &["info", "few.json"]).0 == Some(0));
+}
+
+#[test]
 fn options_of_another_method_of_placement_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -193,7 +225,7 @@ fn options_of_another_method_of_placement_are_refused() {
     std::fs::write(folder.join("photograph.png"), b"\x89PNG").unwrap();
     for (args, expected) in [
         (&["--method", "sdf", "--grid", "2x2x2"][..], "--grid: --method sdf has no use for it; grid has"),
-        (&["--method", "medial-axis", "--spacing", "1"], "--spacing: --method medial-axis has no use for it; grid has"),
+        (&["--method", "medial-axis", "--spacing", "1"], "--spacing: --method medial-axis has no use for it; grid, voxel have"),
         (&["--refine", "3"], "--refine: --method grid has no use for it; sdf, medial-axis have"),
         (&["--method", "grid", "--coverage", "0.5"], "--coverage: --method grid has no use for it"),
         (&["--method", "sdf", "--margin", "1"], "--margin: --method sdf has no use for it; grid has"),
@@ -202,7 +234,15 @@ fn options_of_another_method_of_placement_are_refused() {
         (&["--method", "sdf", "--coverage", "1.5"], "--coverage 1.5: expected a share above 0, at most 1"),
         (&["--method", "sdf", "--coverage", "nan"], "--coverage NaN: expected a share"),
         (&["--method", "sdf", "--refine", "1000000"], "--refine 1000000: expected at most"),
-        (&["--method", "tetrahedra"], "expected grid, sdf, medial-axis"),
+        (&["--method", "voxel", "--coverage", "0.9"], "--coverage: --method voxel has no use for it; sdf, medial-axis have"),
+        (&["--method", "voxel", "--refine", "3"], "--refine: --method voxel has no use for it; sdf, medial-axis have"),
+        (&["--method", "voxel", "--grid", "2x2x2"], "--grid: --method voxel has no use for it; grid has"),
+        (&["--method", "voxel", "--margin", "1"], "--margin: --method voxel has no use for it; grid has"),
+        (&["--method", "voxel", "--count", "0"], "--count 0: expected from 1 to"),
+        (&["--method", "voxel", "--spacing", "0"], "--spacing 0: expected a positive number of metres"),
+        (&["--method", "voxel", "--spacing", "nan"], "--spacing NaN: expected a positive number of metres"),
+        (&["--method", "voxel", "--spacing", "0.001"], "expected from 1 to 10000 in all"),
+        (&["--method", "tetrahedra"], "expected grid, sdf, medial-axis, voxel"),
         (&["--picture", "plan.jpg"], "plan.jpg: expected a name that ends in .png"),
         (&["--picture", "photograph.png"], "photograph.png: was not written by reprobe"),
     ] {

@@ -136,7 +136,7 @@ pub fn place(
     progress.start("placing", 2);
     let mut candidates = match params.method {
         Placement::MedialAxis => medial_axis::candidates(world, space, sides, cull, most),
-        Placement::Sdf | Placement::Grid => ridge::candidates(world, space, cull, most),
+        Placement::Sdf | Placement::Grid | Placement::Voxel => ridge::candidates(world, space, cull, most),
     };
     if candidates.is_empty() {
         // A space without a ridge, such as that beside one wall: wherever it is widest.

@@ -17,13 +17,13 @@ use crate::scene::{Geometry, Scene};
 use crate::transport::World;
 use glam::Vec3;
 
-const CAMERA: Vec3 = Vec3::new(-1.5, 0.3, 1.0);
-const ROOM: (Vec3, Vec3) = (Vec3::new(-2.0, -1.0, -1.5), Vec3::new(2.0, 1.0, 1.5));
-const BOX: (Vec3, Vec3) = (Vec3::new(0.3, -1.0, -0.6), Vec3::new(1.3, 0.1, 0.5));
+pub(super) const CAMERA: Vec3 = Vec3::new(-1.5, 0.3, 1.0);
+pub(super) const ROOM: (Vec3, Vec3) = (Vec3::new(-2.0, -1.0, -1.5), Vec3::new(2.0, 1.0, 1.5));
+pub(super) const BOX: (Vec3, Vec3) = (Vec3::new(0.3, -1.0, -0.6), Vec3::new(1.3, 0.1, 0.5));
 /// More than the room.
-const AROUND: (Vec3, Vec3) = (Vec3::new(-2.7, -1.6, -2.2), Vec3::new(2.8, 1.7, 2.1));
+pub(super) const AROUND: (Vec3, Vec3) = (Vec3::new(-2.7, -1.6, -2.2), Vec3::new(2.8, 1.7, 2.1));
 
-fn world(fill: impl FnOnce(&mut Geometry)) -> World {
+pub(super) fn world(fill: impl FnOnce(&mut Geometry)) -> World {
     let mut geometry = Geometry::default();
     fill(&mut geometry);
     let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::splat(0.5)) });
@@ -32,7 +32,7 @@ fn world(fill: impl FnOnce(&mut Geometry)) -> World {
 }
 
 /// A closed room with a closed box on its floor, a sheet on a wall, and something far outside.
-fn room() -> World {
+pub(super) fn room() -> World {
     world(|g| {
         testing::cuboid(g, ROOM.0, ROOM.1);
         testing::cuboid(g, BOX.0, BOX.1);
@@ -41,7 +41,7 @@ fn room() -> World {
     })
 }
 
-fn within(p: Vec3, (lower, upper): (Vec3, Vec3)) -> bool {
+pub(super) fn within(p: Vec3, (lower, upper): (Vec3, Vec3)) -> bool {
     p.cmpgt(lower).all() && p.cmplt(upper).all()
 }
 
@@ -49,7 +49,12 @@ fn params(method: Placement) -> NonuniformParams {
     NonuniformParams { method, resolution: 40, texels: 2000, candidates: 96, ..NonuniformParams::default() }
 }
 
-fn reachable(world: &World, filled: (Vec3, Vec3), camera: Vec3, params: &NonuniformParams) -> crate::Result<Reachable> {
+pub(super) fn reachable(
+    world: &World,
+    filled: (Vec3, Vec3),
+    camera: Vec3,
+    params: &NonuniformParams,
+) -> crate::Result<Reachable> {
     Reachable::new(world, &Bounds { filled, seen: ROOM }, &[camera], params)
 }
 
@@ -60,7 +65,7 @@ fn placed(world: &World, bounds: (Vec3, Vec3), params: &NonuniformParams) -> (Re
 }
 
 /// The share of the sides that a ray from some probe meets first, walked from the probe's end.
-fn coverage_by_force(world: &World, sides: &Sides, probes: &[Vec3]) -> f64 {
+pub(super) fn coverage_by_force(world: &World, sides: &Sides, probes: &[Vec3]) -> f64 {
     let meets = |probe: Vec3, p: Vec3, n: Vec3| {
         let way = p - probe;
         let hit = world.closest(&Ray::new(probe, way.normalize()));

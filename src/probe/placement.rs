@@ -24,11 +24,14 @@ pub enum Placement {
     Sdf,
     /// On its medial axis.
     MedialAxis,
+    /// Evenly, in empty voxels next to its surfaces.
+    Voxel,
 }
 
 impl Placement {
     /// All of them, with their names.
-    pub const ALL: [(Self, &str); 3] = [(Self::Grid, "grid"), (Self::Sdf, "sdf"), (Self::MedialAxis, "medial-axis")];
+    pub const ALL: [(Self, &str); 4] =
+        [(Self::Grid, "grid"), (Self::Sdf, "sdf"), (Self::MedialAxis, "medial-axis"), (Self::Voxel, "voxel")];
 }
 
 impl std::fmt::Display for Placement {
@@ -96,26 +99,7 @@ pub struct ProbeWeight {
 impl ProbeGrid {
     /// Fills the box from `lower` to `upper`. No probe is blocked yet.
     pub fn in_box(lower: Vec3, upper: Vec3, density: Density, provenance: Provenance) -> Result<Self> {
-        let extent = upper - lower;
-        if !extent.is_finite() || extent.min_element() < 0.0 {
-            return Err(Error::Request(format!("box from {lower} to {upper}: expected finite corners, the lower one first")));
-        }
-        let (counts, spacing) = match density {
-            Density::Counts(counts) => {
-                let counts = UVec3::from(counts);
-                (counts, extent / counts.max(UVec3::ONE).as_vec3())
-            }
-            Density::Spacing(s) if s.is_finite() && s > 0.0 => {
-                ((extent / s).round().min(Vec3::splat(1e6)).as_uvec3().max(UVec3::ONE), Vec3::splat(s))
-            }
-            Density::Count(n) if n > 0 => {
-                let counts = UVec3::from(even_counts(extent, n));
-                (counts, extent / counts.as_vec3())
-            }
-            Density::Count(n) => return Err(Error::Request(format!("{n} probes: expected at least 1"))),
-            Density::Spacing(s) => return Err(Error::Request(format!("spacing {s}: expected a positive number of metres"))),
-        };
-        check_counts(counts.to_array()).map_err(Error::Request)?;
+        let (counts, spacing) = cells(lower, upper, density)?;
         let origin = (lower + upper) * 0.5 - spacing * (counts - 1).as_vec3() * 0.5;
         let mut grid = Self {
             origin: origin.to_array(),
@@ -230,6 +214,31 @@ struct Head {
 pub(super) fn method(path: &Path, text: &str) -> Result<Placement> {
     let head: Head = serde_json::from_str(text).map_err(|e| Error::at_line(path, e.line() as u32, e.to_string()))?;
     Ok(head.method.unwrap_or_default())
+}
+
+/// How many cells a grid of a density has along each axis of the box from `lower` to `upper`, and their size, metres.
+pub(super) fn cells(lower: Vec3, upper: Vec3, density: Density) -> Result<(UVec3, Vec3)> {
+    let extent = upper - lower;
+    if !extent.is_finite() || extent.min_element() < 0.0 {
+        return Err(Error::Request(format!("box from {lower} to {upper}: expected finite corners, the lower one first")));
+    }
+    let (counts, spacing) = match density {
+        Density::Counts(counts) => {
+            let counts = UVec3::from(counts);
+            (counts, extent / counts.max(UVec3::ONE).as_vec3())
+        }
+        Density::Spacing(s) if s.is_finite() && s > 0.0 => {
+            ((extent / s).round().min(Vec3::splat(1e6)).as_uvec3().max(UVec3::ONE), Vec3::splat(s))
+        }
+        Density::Count(n) if n > 0 => {
+            let counts = UVec3::from(even_counts(extent, n));
+            (counts, extent / counts.as_vec3())
+        }
+        Density::Count(n) => return Err(Error::Request(format!("{n} probes: expected at least 1"))),
+        Density::Spacing(s) => return Err(Error::Request(format!("spacing {s}: expected a positive number of metres"))),
+    };
+    check_counts(counts.to_array()).map_err(Error::Request)?;
+    Ok((counts, spacing))
 }
 
 fn check_counts(counts: [u32; 3]) -> std::result::Result<(), String> {

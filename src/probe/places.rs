@@ -14,8 +14,11 @@ use std::path::Path;
 pub struct ProbeList {
     /// How they were placed: any but [`Placement::Grid`].
     pub method: Placement,
-    /// Their positions, metres; those that add most to what the ones before them see come first.
+    /// Their positions, metres; on a skeleton, those that add most to what the ones before them see come first.
     pub positions: Vec<[f32; 3]>,
+    /// How far each probe's light is interpolated ([`super::support`]), metres, if the method says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f32>,
     /// Where the list came from.
     pub provenance: Provenance,
 }
@@ -32,6 +35,9 @@ impl ProbeList {
         }
         if !(1..=PROBES_MAX).contains(&self.positions.len()) {
             return Err(format!("{} positions, expected from 1 to {PROBES_MAX}", self.positions.len()));
+        }
+        if let Some(radius) = self.radius.filter(|r| !(r.is_finite() && *r > 0.0)) {
+            return Err(format!("radius {radius}: expected a positive number of metres"));
         }
         match self.positions.iter().position(|p| !Vec3::from(*p).is_finite()) {
             Some(i) => Err(format!("position {i} is {:?}, expected finite numbers", self.positions[i])),
@@ -146,6 +152,14 @@ impl Places {
         list.iter().map(|p| Vec3::from(*p)).collect()
     }
 
+    /// How far each probe's light is interpolated ([`super::support`]), metres; only lists may say.
+    pub fn radius(&self) -> Option<f32> {
+        match self {
+            Self::Grid(_) => None,
+            Self::List(list) => list.radius,
+        }
+    }
+
     /// Where they came from.
     pub fn provenance(&self) -> &Provenance {
         match self {
@@ -183,20 +197,34 @@ mod tests {
         assert_eq!((places.method(), places.positions().len()), (Placement::Grid, 2));
         assert_eq!(places, Places::Grid(grid));
 
-        let list = ProbeList { method: Placement::MedialAxis, positions: vec![[0.1, 0.2, 0.3], [1.0, 2.0, 3.0]], provenance };
+        let positions = vec![[0.1, 0.2, 0.3], [1.0, 2.0, 3.0]];
+        let list = ProbeList {
+            method: Placement::MedialAxis,
+            positions: positions.clone(),
+            radius: None,
+            provenance: provenance.clone(),
+        };
         list.write(&path).unwrap();
         let places = Places::read(&path).unwrap();
         assert_eq!(places.positions()[1], Vec3::new(1.0, 2.0, 3.0));
         assert_eq!((places.provenance().stage.as_str(), places.method()), ("place-probes", Placement::MedialAxis));
         assert_eq!(places, Places::List(list));
         let within: Places = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-        assert_eq!(within, places);
+        assert_eq!((within.radius(), within), (None, places));
+        assert!(!std::fs::read_to_string(&path).unwrap().contains("radius"));
+
+        let list = ProbeList { method: Placement::Voxel, positions, radius: Some(0.75), provenance };
+        list.write(&path).unwrap();
+        assert_eq!((Places::read(&path).unwrap().radius(), Places::read(&path).unwrap()), (Some(0.75), Places::List(list)));
 
         let sealed = std::fs::read_to_string(&path).unwrap();
         let good: String = sealed.lines().filter(|line| !line.contains("\"checksum\"")).map(|line| format!("{line}\n")).collect();
         for (from, to, expected) in [
-            ("medial-axis", "magic", "unknown variant `magic`"),
-            ("medial-axis", "grid", "missing field `origin`"),
+            ("voxel", "magic", "unknown variant `magic`"),
+            ("voxel", "grid", "missing field `origin`"),
+            ("0.75", "-0.5", "radius -0.5: expected a positive number of metres"),
+            ("0.75", "0.0", "radius 0: expected a positive number"),
+            ("0.75", "1e60", "number out of range"),
             ("0.1", "1e99", "probes.json"),
             ("\"positions\"", "\"places\"", "missing field `positions`"),
             ("[\n    [", "[], \"x\": [\n    [", "0 positions, expected from 1"),

@@ -138,7 +138,7 @@ fn common<'a>(a: &'a [u64], b: &'a [u64]) -> impl Iterator<Item = u64> + 'a {
 }
 
 /// The candidate that sees most of `wanted`, the first of equals; none where all see nothing of it.
-fn best(sides: &Sides, rows: &[Row], left: &[bool], wanted: &Row) -> Option<usize> {
+pub(super) fn best(sides: &Sides, rows: &[Row], left: &[bool], wanted: &Row) -> Option<usize> {
     let gain = |i: usize| if left[i] { sides.area_of(common(&rows[i], wanted)) } else { 0.0 };
     let gains: Vec<f64> = (0..rows.len()).into_par_iter().map(gain).collect();
     let best = (0..gains.len()).rev().max_by(|&a, &b| gains[a].total_cmp(&gains[b]))?;

@@ -46,7 +46,10 @@ fn both_places(world: &World) -> [(&'static str, Places); 2] {
     let moved = |i: usize| (grid.position(i) + Vec3::new(0.1, -0.05, 0.07) * (i % 5) as f32).to_array();
     let positions = (0..grid.len()).rev().map(moved).collect();
     grid.blocked = vec![4];
-    [("grid", Places::Grid(grid)), ("list", Places::List(ProbeList { method: Placement::Sdf, positions, provenance }))]
+    [
+        ("grid", Places::Grid(grid)),
+        ("list", Places::List(ProbeList { method: Placement::Sdf, positions, radius: None, provenance })),
+    ]
 }
 
 fn check(what: &str, view: &GBuffer, gpu: &[Rgb], fine: &[Rgb], most_apart: f32) {

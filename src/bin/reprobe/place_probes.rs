@@ -14,8 +14,9 @@ use std::path::PathBuf;
 /// The other methods look for places in the free space of all that cameras see, or of --bounds: what can be walked to from there. sdf takes those that are
 /// equally far from several surfaces, by a distance field; medial-axis the middles of balls that touch several surfaces. Of these,
 /// probes are chosen until they see enough (--coverage), those first that see most of what no other sees; or so many (--count) that all
-/// surfaces are seen well by one of them, from near and not at a slant. --refine moves them to where they see more. Every stage takes
-/// such sets in the place of a grid.
+/// surfaces are seen well by one of them, from near and not at a slant. --refine moves them to where they see more. voxel spreads probes evenly
+/// through the empty space next to surfaces, as many as a grid of --spacing has points or --count, with one support radius: within it, a
+/// point on a surface has ten probes to interpolate on average. Every stage takes such sets in the place of a grid.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe place-probes room/scene.xml -o probes.json
@@ -23,6 +24,7 @@ use std::path::PathBuf;
   reprobe place-probes room/scene.xml -o probes.json --spacing 0.5 --bounds=-2,0.2,-2,2,2.2,2
   reprobe place-probes room/scene.xml -o probes.json --method sdf --coverage 0.999 --picture plan.png
   reprobe place-probes room/scene.xml -o probes.json --method medial-axis --count 24 --refine 20
+  reprobe place-probes room/scene.xml -o probes.json --method voxel --spacing 0.7 --path room/path.json --picture plan.png
   reprobe place-probes room/scene.xml -o probes.json --path room/path.json --grid 4x3x4 --coverage-picture coverage.png")]
 pub struct Args {
     /// Mitsuba scene, XML or JSON
@@ -31,16 +33,16 @@ pub struct Args {
     /// The file to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How to place them: grid, sdf or medial-axis [default: grid]
+    /// How to place them: grid, sdf, medial-axis or voxel [default: grid]
     #[arg(long, value_name = "METHOD")]
     method: Option<Placement>,
     /// Probes along x, y and z [default: 7x6x6]
     #[arg(long, value_name = "XxYxZ", conflicts_with_all = ["spacing", "count"])]
     grid: Option<List<u32, 3, 'x'>>,
-    /// About so many probes, evenly spaced; of sdf and medial-axis, so many
+    /// About so many probes, evenly spaced; of the other methods, so many [default of voxel: 200]
     #[arg(long, value_name = "N", conflicts_with = "spacing")]
     count: Option<u32>,
-    /// Distance of neighbours, metres
+    /// grid, voxel: distance of neighbours, metres; of voxel, as many probes as a grid of it has
     #[arg(long, value_name = "M")]
     spacing: Option<f32>,
     /// sdf, medial-axis: share of the reachable surfaces that probes are to see [default: 0.999, or what --count sees]
@@ -52,7 +54,7 @@ pub struct Args {
     /// The box to fill, metres
     #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", conflicts_with = "path", allow_hyphen_values = true)]
     bounds: Option<List<f32, 6, ','>>,
-    /// Fill the space that this camera path moves in; of sdf and medial-axis, that its cameras see
+    /// Fill the space that this camera path moves in; of the other methods, that its cameras see
     #[arg(long, value_name = "PATH.json")]
     path: Option<PathBuf>,
     /// grid: widens the box of the camera path, metres [default: 0.5]

@@ -60,7 +60,7 @@ fn lit(world: &World, places: Places, params: &LightFieldBakeParams) -> LightFie
 /// As many probes as positions, in no grid.
 fn listed(positions: Vec<[f32; 3]>) -> Places {
     let provenance = Provenance::new("place-probes", "", 0, &0);
-    Places::List(ProbeList { method: Placement::Sdf, positions, provenance })
+    Places::List(ProbeList { method: Placement::Sdf, positions, radius: None, provenance })
 }
 
 const FINE: LightFieldBakeParams = LightFieldBakeParams { size: 256, ambient_size: 8, spp: 1, lobe_samples: 1, bounces: 1 };

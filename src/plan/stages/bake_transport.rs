@@ -99,6 +99,7 @@ impl BakeTransport {
         let world = cx.opaque_world(&self.scene)?;
         let places = Places::read(&self.probes)?;
         places.provenance().check_scene(&self.probes, &world.scene.hash)?;
+        let params = TransportParams { radius: params.radius.or(places.radius()), ..params };
         let provenance =
             Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params).with_input("probes", hash_file(&self.probes)?);
         if self.is_up_to_date(&provenance) {

@@ -1,12 +1,12 @@
 //! `place-probes`.
 
 use crate::base::clock::seconds;
-use crate::io::{Provenance, picture};
+use crate::io::Provenance;
 use crate::plan::option::{List, stage, text};
 use crate::plan::{Context, Outcome};
 use crate::probe::coverage_picture::{self, Coverage};
-use crate::probe::nonuniform::{Bounds, COVERAGE, NonuniformParams, Reachable, place};
-use crate::probe::placement::{Density, PROBES_MAX, Placement, ProbeGrid};
+use crate::probe::nonuniform::{Bounds, NonuniformParams, Reachable, place};
+use crate::probe::placement::{Density, Placement, ProbeGrid};
 use crate::probe::places::ProbeList;
 use crate::probe::plan_picture;
 use crate::probe::reach::{ReachParams, blocked, reach};
@@ -18,10 +18,10 @@ use glam::Vec3;
 use serde_json::json;
 use std::path::PathBuf;
 
-text!(Placement);
+mod check;
+mod voxel;
 
-/// Most passes of a refinement.
-const PASSES_MAX: u32 = 10_000;
+text!(Placement);
 
 stage! {
     /// Places probes: on a regular grid, or where a scene's shape asks for them.
@@ -37,7 +37,7 @@ stage! {
         "--grid" grid: Option<List<u32, 3, 'x'>>,
         /// About so many probes, evenly spaced; of the other methods, so many.
         "--count" count: Option<u32>,
-        /// Distance of neighbours, metres.
+        /// Distance of neighbours, metres; of voxel, as many probes as a grid of it has.
         "--spacing" spacing: Option<f32>,
         /// Share of the reachable surfaces that probes are to see.
         "--coverage" coverage: Option<f64>,
@@ -73,68 +73,8 @@ impl PlaceProbes {
         ReachParams { margin: self.margin.unwrap_or(base.margin), ..base }
     }
 
-    /// Refuses what does not go together.
-    pub fn check(&self) -> Result<()> {
-        self.check_method()?;
-        if let Some(margin) = self.margin.filter(|m| !(m.is_finite() && *m >= 0.0)) {
-            return Err(Error::Request(format!("--margin {margin}: expected metres, not negative")));
-        }
-        if let Some(bounds) = &self.bounds
-            && !(bounds.0.iter().all(|x| x.is_finite()) && (0..3).all(|i| bounds.0[i] <= bounds.0[i + 3]))
-        {
-            return Err(Error::Request(format!(
-                "--bounds {bounds}: expected x0,y0,z0,x1,y1,z1, the lower corner first, like -2,0,-2,2,2.5,2"
-            )));
-        }
-        let density = [self.grid.is_some(), self.count.is_some(), self.spacing.is_some()];
-        if density.into_iter().filter(|given| *given).count() > 1 {
-            return Err(Error::Request("--grid, --count, --spacing: expected one of them".into()));
-        }
-        if self.bounds.is_some() && self.path.is_some() {
-            return Err(Error::Request("--bounds, --path: expected one of them".into()));
-        }
-        for path in [&self.picture, &self.coverage_picture].into_iter().flatten() {
-            picture::check_png(path)?;
-        }
-        if self.picture.is_some() && self.picture == self.coverage_picture {
-            return Err(Error::Request("--picture, --coverage-picture: expected two files".into()));
-        }
-        Ok(())
-    }
-
     fn draws(&self) -> bool {
         self.picture.is_some() || self.coverage_picture.is_some()
-    }
-
-    /// Refuses options that the method has no use for, and values out of their range.
-    fn check_method(&self) -> Result<()> {
-        let method = self.method.unwrap_or_default();
-        let is_grid = method == Placement::Grid;
-        for (option, is_given, of_grid) in [
-            ("grid", self.grid.is_some(), true),
-            ("spacing", self.spacing.is_some(), true),
-            ("margin", self.margin.is_some(), true),
-            ("coverage", self.coverage.is_some(), false),
-            ("refine", self.refine.is_some(), false),
-        ] {
-            if is_given && of_grid != is_grid {
-                let others = if of_grid { "grid has" } else { "sdf, medial-axis have" };
-                return Err(Error::Request(format!("--{option}: --method {method} has no use for it; {others}")));
-            }
-        }
-        if is_grid {
-            return Ok(());
-        }
-        if let Some(count) = self.count.filter(|n| !(1..=PROBES_MAX as u32).contains(n)) {
-            return Err(Error::Request(format!("--count {count}: expected from 1 to {PROBES_MAX} probes")));
-        }
-        if let Some(coverage) = self.coverage.filter(|c| !(*c > 0.0 && *c <= 1.0)) {
-            return Err(Error::Request(format!("--coverage {coverage}: expected a share above 0, at most 1, like {COVERAGE}")));
-        }
-        if let Some(passes) = self.refine.filter(|n| *n > PASSES_MAX) {
-            return Err(Error::Request(format!("--refine {passes}: expected at most {PASSES_MAX} passes")));
-        }
-        Ok(())
     }
 
     fn density(&self) -> Density {
@@ -154,6 +94,7 @@ impl PlaceProbes {
         match self.method.unwrap_or_default() {
             Placement::Grid => self.run_grid(cx, &world, &ground),
             Placement::Sdf | Placement::MedialAxis => self.run_nonuniform(cx, &world, &ground),
+            Placement::Voxel => self.run_voxel(cx, &world, &ground),
         }
     }
 
@@ -222,6 +163,7 @@ impl PlaceProbes {
         let list = ProbeList {
             method,
             positions: placed.positions.iter().map(|p| p.to_array()).collect(),
+            radius: None,
             provenance: self.provenance(cx, world, ground, json!({ "nonuniform": params })),
         };
         list.write(&self.output)?;
