@@ -1,8 +1,8 @@
 //! A stage of a pipeline: one of the subcommands that read files and write files.
 
 use super::stages::{
-    BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap, Relight,
-    RenderPath, Resmap,
+    BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
+    PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
 };
 use super::{Context, Outcome, overwrite};
 use crate::Result;
@@ -37,6 +37,8 @@ pub enum Stage {
     Compare(Compare),
     /// `inspect-lightfield`
     InspectLightfield(InspectLightfield),
+    /// `inspect-transport`
+    InspectTransport(InspectTransport),
 }
 
 /// The stages that bake, in the order in which they run.
@@ -67,6 +69,7 @@ macro_rules! with {
             Stage::RenderPath($s) => $what,
             Stage::Compare($s) => $what,
             Stage::InspectLightfield($s) => $what,
+            Stage::InspectTransport($s) => $what,
         }
     };
 }
@@ -90,7 +93,8 @@ from!(
     BakeTransport,
     RenderPath,
     Compare,
-    InspectLightfield
+    InspectLightfield,
+    InspectTransport
 );
 
 impl Stage {
@@ -112,6 +116,7 @@ impl Stage {
             Self::RenderPath(s) => of(s, RenderPath::COMMAND),
             Self::Compare(s) => of(s, Compare::COMMAND),
             Self::InspectLightfield(s) => of(s, InspectLightfield::COMMAND),
+            Self::InspectTransport(s) => of(s, InspectTransport::COMMAND),
         }
     }
 
@@ -133,12 +138,14 @@ impl Stage {
     /// What it reads of what other stages write.
     pub fn inputs(&self) -> Vec<&PathBuf> {
         match self {
-            Self::PlaceProbes(_) | Self::Curvature(_) | Self::BakeLightmap(_) => vec![],
+            Self::PlaceProbes(s) => s.refine_by.iter().collect(),
+            Self::Curvature(_) | Self::BakeLightmap(_) => vec![],
             Self::Resmap(s) => vec![&s.probes],
             Self::BakeLightfield(s) => vec![&s.probes],
             Self::BakeTransport(s) => vec![&s.probes],
             Self::Relight(s) => vec![&s.probes],
             Self::InspectLightfield(s) => vec![&s.probes],
+            Self::InspectTransport(s) => vec![&s.probes],
             Self::Qhmap(s) => vec![&s.resmap],
             Self::BakeProbes(s) => [&s.probes, &s.qhmap].into_iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::RenderPath(s) => s.probes.iter().chain(&s.lightmap).chain(&s.curvature).collect(),
@@ -159,6 +166,7 @@ impl Stage {
             Self::BakeProbes(s) => [&s.scene].into_iter().chain(&s.for_path).collect(),
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),
+            Self::InspectTransport(s) => [&s.scene].into_iter().chain(&s.path).collect(),
             Self::Qhmap(_) => vec![],
             Self::Compare(s) => s.second_reference.iter().collect(),
         }

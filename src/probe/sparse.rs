@@ -10,12 +10,13 @@ use super::nonuniform::Reachable;
 use super::placement::{Density, PROBES_MAX, cells};
 use super::shift::{Watch, shift};
 use super::skeleton::space::Space;
-use super::support::{OVERLAP, mean_overlap, radius};
+use super::support::{OVERLAP, mean_overlap, radius, weight};
 use super::thin::thin;
 use crate::base::progress::Progress;
 use crate::transport::World;
 use crate::{Error, Result};
 use glam::Vec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How many probes where nothing is asked for; *Paper* (§5): "typical numbers are [...] 200 probes".
@@ -83,18 +84,46 @@ pub struct Sparse {
     pub seen: f64,
 }
 
-/// Places probes in the free space, and finds their radius for receivers on the reachable surfaces.
+/// A place of the surfaces, and how badly it is served by the probes that there are.
+pub type Need = (Vec3, f32);
+
+/// How far needs may thin probes out or crowd them, relative to their mean.
+const NEEDS: (f32, f32) = (0.25, 8.0);
+
+/// How dense probes shall be at points: the mean need around each, by the kernel of the density estimate.
+fn wanted(points: &[Vec3], spacing: f32, needs: &[Need]) -> Vec<f32> {
+    let mean = needs.iter().map(|need| need.1).sum::<f32>() / needs.len() as f32;
+    let at = |p: &Vec3| {
+        let (sum, weights) = needs.iter().fold((0.0, 0.0), |(sum, weights), (x, need)| {
+            let w = weight(p.distance(*x) / spacing);
+            (sum + w * need, weights + w)
+        });
+        let local = if weights > 0.0 { sum / weights } else { mean };
+        (local / mean.max(f32::MIN_POSITIVE)).clamp(NEEDS.0, NEEDS.1)
+    };
+    points.par_iter().map(at).collect()
+}
+
+/// Places probes in the free space, more of them where there is more need (if any is told), and finds their radius for receivers on the
+/// reachable surfaces.
 ///
 /// # Errors
 /// There is no empty voxel.
-pub fn place(world: &World, reachable: &Reachable, params: &SparseParams, progress: &dyn Progress) -> Result<Sparse> {
+pub fn place(
+    world: &World,
+    reachable: &Reachable,
+    params: &SparseParams,
+    needs: &[Need],
+    progress: &dyn Progress,
+) -> Result<Sparse> {
     let sides = &reachable.sides;
     progress.start("placing", 2);
     let candidates = candidates(&reachable.space);
     if candidates.is_empty() {
         return Err(Error::Request("no voxel of the free space is empty: give another --path or --bounds".into()));
     }
-    let left = thin(&candidates, params.spacing, params.count as usize);
+    let wanted = (!needs.is_empty()).then(|| wanted(&candidates, params.spacing, needs));
+    let left = thin(&candidates, params.spacing, params.count as usize, wanted.as_deref());
     let positions: Vec<Vec3> = left.into_iter().map(|i| candidates[i]).collect();
     let mut watch = Watch { rows: sides.rows(world, &positions), positions };
     progress.advance(1);

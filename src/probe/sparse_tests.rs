@@ -23,7 +23,7 @@ fn free(world: &World, bounds: (Vec3, Vec3)) -> Reachable {
 
 fn placed(world: &World, bounds: (Vec3, Vec3), density: Density) -> (Reachable, Sparse) {
     let reachable = free(world, bounds);
-    let placed = place(world, &reachable, &params(bounds, density), &Silent).unwrap();
+    let placed = place(world, &reachable, &params(bounds, density), &[], &Silent).unwrap();
     (reachable, placed)
 }
 

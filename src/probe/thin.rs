@@ -46,8 +46,9 @@ impl Crowd<'_> {
 }
 
 /// Removes the point where the kernels of all points that are left, of radius `spacing` in metres, add up to most, the first of equal ones,
-/// until `count` are left. Their indices, ascending.
-pub fn thin(points: &[Vec3], spacing: f32, count: usize) -> Vec<usize> {
+/// until `count` are left. Their indices, ascending. `wanted`: how dense points shall be at each of them, relative to the others (above 0); none
+/// for the same everywhere.
+pub fn thin(points: &[Vec3], spacing: f32, count: usize, wanted: Option<&[f32]>) -> Vec<usize> {
     let lower = points.iter().fold(Vec3::INFINITY, |lower, p| lower.min(*p));
     let mut crowd = Crowd { points, lower, spacing, cells: BTreeMap::new() };
     for (i, p) in (0..).zip(points) {
@@ -56,15 +57,21 @@ pub fn thin(points: &[Vec3], spacing: f32, count: usize) -> Vec<usize> {
     }
     let density = |i: usize| crowd.near(i).map(|(_, weight)| weight).sum();
     let mut density: Vec<u64> = (0..points.len()).into_par_iter().map(density).collect();
+    let crowding = |density: u64, i: usize| match wanted {
+        Some(wanted) => (density as f64 / f64::from(wanted[i])) as u64,
+        None => density,
+    };
     // Densities as they were last known: what they are now is no more.
-    let mut heap: BinaryHeap<_> = density.iter().copied().zip((0..points.len()).map(Reverse)).collect();
+    let known = density.iter().enumerate().map(|(i, &density)| (crowding(density, i), Reverse(i)));
+    let mut heap: BinaryHeap<_> = known.collect();
     let mut is_left = vec![true; points.len()];
     let mut left = points.len();
     while left > count
         && let Some((known, Reverse(i))) = heap.pop()
     {
-        if known > density[i] {
-            heap.push((density[i], Reverse(i)));
+        let now = crowding(density[i], i);
+        if known > now {
+            heap.push((now, Reverse(i)));
             continue;
         }
         crowd.near(i).for_each(|(j, weight)| density[j] -= weight);
@@ -101,18 +108,27 @@ mod tests {
         let lattice: Vec<Vec3> = (0..125).map(|i| Vec3::new((i % 5) as f32, (i / 5 % 5) as f32, (i / 25) as f32)).collect();
         for points in [scattered, lattice] {
             for (spacing, count) in [(0.3, 100), (1.2, 20), (2.5, 5), (100.0, 2)] {
-                assert_eq!(thin(&points, spacing, count), by_force(&points, spacing, count), "{spacing}");
+                assert_eq!(thin(&points, spacing, count, None), by_force(&points, spacing, count), "{spacing}");
             }
         }
     }
 
     #[test]
+    fn more_are_left_where_more_are_wanted() {
+        let points: Vec<Vec3> = (0..400).map(|i| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0)).collect();
+        let wanted: Vec<f32> = points.iter().map(|p| if p.x < 10.0 { 3.0 } else { 1.0 }).collect();
+        let left = thin(&points, 4.0, 100, Some(&wanted));
+        let wanted_more = left.iter().filter(|&&i| points[i].x < 10.0).count();
+        assert!((68..=82).contains(&wanted_more), "{wanted_more}");
+    }
+
+    #[test]
     fn nothing_goes_where_there_are_few_enough() {
         let points = [Vec3::ZERO, Vec3::X, Vec3::ZERO];
-        assert_eq!(thin(&points, 1.0, 3), [0, 1, 2]);
-        assert_eq!(thin(&points, 1.0, 9), [0, 1, 2]);
-        assert_eq!(thin(&points, 1.0, 2), [1, 2], "of two points in one place one is left");
-        assert_eq!(thin(&[], 1.0, 2), [0; 0]);
+        assert_eq!(thin(&points, 1.0, 3, None), [0, 1, 2]);
+        assert_eq!(thin(&points, 1.0, 9, None), [0, 1, 2]);
+        assert_eq!(thin(&points, 1.0, 2, None), [1, 2], "of two points in one place one is left");
+        assert_eq!(thin(&[], 1.0, 2, None), [0; 0]);
     }
 
     #[test]
@@ -121,7 +137,7 @@ mod tests {
         let random = |i: u32, k: u32| unit(hash_words(&[i, k]));
         let corner = |i: u32| if i % 10 < 7 { 0.5 } else { 1.0 };
         let points: Vec<Vec3> = (0..6000).map(|i| Vec3::new(random(i, 0), random(i, 1), 0.0) * corner(i)).collect();
-        let left = thin(&points, 0.1, 100);
+        let left = thin(&points, 0.1, 100, None);
         let crowded = left.iter().filter(|&&i| points[i].max_element() < 0.5).count();
         assert!((20..=32).contains(&crowded), "{crowded} of 100 in a quarter");
         let gap = |&i: &usize| left.iter().filter(|&&j| j != i).map(|&j| points[i].distance(points[j])).fold(9.0, f32::min);

@@ -66,6 +66,7 @@ pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
         ("compare", &[&["device", "seed"][..], &SCENE].concat()),
         ("devices", &[&["device", "seed", "threads"][..], &SCENE].concat()),
         ("inspect-lightfield", &["device", "seed"]),
+        ("inspect-transport", &["device", "seed"]),
         ("info", &["device", "seed"]),
     ] {
         let hidden: Vec<clap::Arg> =

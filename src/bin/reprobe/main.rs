@@ -12,6 +12,7 @@ mod devices;
 mod evaluate;
 mod info;
 mod inspect_lightfield;
+mod inspect_transport;
 mod place_probes;
 mod preset;
 mod qhmap;
@@ -63,6 +64,7 @@ enum Command {
     RenderPath(render_path::Args),
     Compare(compare::Args),
     InspectLightfield(inspect_lightfield::Args),
+    InspectTransport(inspect_transport::Args),
     Devices(devices::Args),
     Info(info::Args),
     Run(run::Args),
@@ -123,6 +125,7 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::RenderPath(args) => args.stage().into(),
         Command::Compare(args) => args.stage().into(),
         Command::InspectLightfield(args) => args.stage().into(),
+        Command::InspectTransport(args) => args.stage().into(),
         Command::Devices(args) => return devices::run(&args),
         Command::Info(args) => {
             cx.refuse_gpu("info")?;
@@ -141,8 +144,8 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
 mod tests {
     use super::*;
     use reprobe::plan::stages::{
-        BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, PlaceProbes, Qhmap,
-        Relight, RenderPath, Resmap,
+        BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
+        PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
     };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -162,6 +165,7 @@ mod tests {
             (RenderPath::COMMAND, RenderPath::OPTIONS),
             (Compare::COMMAND, Compare::OPTIONS),
             (InspectLightfield::COMMAND, InspectLightfield::OPTIONS),
+            (InspectTransport::COMMAND, InspectTransport::OPTIONS),
         ] {
             let sub = cli.find_subcommand(command).unwrap_or_else(|| panic!("no subcommand {command}"));
             let mut typed: Vec<String> = sub.get_arguments().filter_map(|a| Some(format!("--{}", a.get_long()?))).collect();

@@ -51,6 +51,9 @@ pub struct Args {
     /// sdf, medial-axis: passes over all probes that move them to where they see more
     #[arg(long, value_name = "N")]
     refine: Option<u32>,
+    /// voxel: more probes where this transport of other probes, from bake-transport, loses light, and fewer elsewhere
+    #[arg(long, value_name = "FOLDER")]
+    refine_by: Option<PathBuf>,
     /// The box to fill, metres
     #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", conflicts_with = "path", allow_hyphen_values = true)]
     bounds: Option<List<f32, 6, ','>>,
@@ -81,6 +84,7 @@ impl Args {
             spacing,
             coverage,
             refine,
+            refine_by,
             bounds,
             path,
             margin,
@@ -95,6 +99,7 @@ impl Args {
             spacing,
             coverage,
             refine,
+            refine_by,
             bounds,
             path,
             margin,

@@ -10,6 +10,7 @@ pub mod bake;
 pub mod cluster;
 pub mod compress;
 pub mod harmonics;
+pub mod inspect;
 pub mod light;
 pub mod operator;
 pub mod params;

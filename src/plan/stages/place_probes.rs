@@ -43,6 +43,8 @@ stage! {
         "--coverage" coverage: Option<f64>,
         /// Passes that move probes to where they see more.
         "--refine" refine: Option<u32>,
+        /// Transport of other probes: where more are needed.
+        "--refine-by" refine_by: Option<PathBuf>,
         /// The box to fill, metres: its lower corner, then its upper one.
         "--bounds" bounds: Option<List<f32, 6, ','>>,
         /// Camera path whose space is filled.

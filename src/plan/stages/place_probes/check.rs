@@ -50,6 +50,7 @@ impl PlaceProbes {
             ("margin", self.margin.is_some(), of_grid),
             ("coverage", self.coverage.is_some(), skeleton),
             ("refine", self.refine.is_some(), skeleton),
+            ("refine-by", self.refine_by.is_some(), &[Placement::Voxel]),
         ] {
             if is_given && !methods.contains(&method) {
                 let names: Vec<String> = methods.iter().map(Placement::to_string).collect();

@@ -1,15 +1,22 @@
 //! `place-probes --method voxel`.
 
 use super::{Ground, PlaceProbes, percent};
-use crate::Result;
 use crate::base::clock::seconds;
+use crate::io::provenance::hash_file;
+use crate::method::radiance_probes::operator::Transport;
+use crate::method::radiance_probes::round_trip::{norms, sample};
 use crate::plan::{Context, Outcome};
 use crate::probe::nonuniform::{NonuniformParams, Reachable};
 use crate::probe::placement::{Density, Placement};
 use crate::probe::places::ProbeList;
-use crate::probe::sparse::{COUNT, Sparse, SparseParams, place};
+use crate::probe::set::ProbeSet;
+use crate::probe::sparse::{COUNT, Need, Sparse, SparseParams, place};
 use crate::transport::World;
+use crate::{Error, Result};
 use serde_json::json;
+
+/// Receivers that say where probes are needed.
+const RECEIVERS: u32 = 4000;
 
 impl PlaceProbes {
     pub(super) fn run_voxel(&self, cx: &Context, world: &World, ground: &Ground) -> Result<Outcome> {
@@ -23,7 +30,8 @@ impl PlaceProbes {
             reachable.sides.list.len(),
             clock()
         ));
-        let placed = place(world, &reachable, &params, cx.progress())?;
+        let needs = self.needs(cx, world)?;
+        let placed = place(world, &reachable, &params, &needs, cx.progress())?;
         if placed.positions.len() < params.count as usize {
             let (wanted, count) = (params.count, placed.positions.len());
             cx.listener.warn(&format!("{wanted} probes were asked for: the scene has places for {count} only"));
@@ -32,13 +40,29 @@ impl PlaceProbes {
             method: Placement::Voxel,
             positions: placed.positions.iter().map(|p| p.to_array()).collect(),
             radius: Some(placed.radius),
-            provenance: self.provenance(cx, world, ground, json!({ "sparse": params })),
+            provenance: match &self.refine_by {
+                Some(folder) => self
+                    .provenance(cx, world, ground, json!({ "sparse": params }))
+                    .with_input("transport", hash_file(&ProbeSet::path(folder))?),
+                None => self.provenance(cx, world, ground, json!({ "sparse": params })),
+            },
         };
         list.write(&self.output)?;
         let seconds = clock();
         let times = reachable.sides.times_seen(&placed.rows);
         self.draw(cx, world, (ground, &reachable), (&placed.positions, &times))?;
         Ok(self.report(ground, &params, &placed, seconds))
+    }
+
+    /// What a transport of other probes loses at receivers, on the way to them and back (§5.2).
+    fn needs(&self, cx: &Context, world: &World) -> Result<Vec<Need>> {
+        let Some(folder) = &self.refine_by else { return Ok(Vec::new()) };
+        let transport = Transport::load(folder, &world.scene)?;
+        let receivers = sample(transport.receivers.len(), RECEIVERS);
+        cx.listener.detail(&format!("what {} receivers lose on the way to the probes of {}", receivers.len(), folder.display()));
+        let norms = norms(world, &transport, &receivers)
+            .ok_or_else(|| Error::input(folder, "its texels keep sh1: bake with --receiver irradiance"))?;
+        Ok(receivers.iter().map(|&r| transport.place(world, r)).zip(norms).collect())
     }
 
     fn report(&self, ground: &Ground, params: &SparseParams, placed: &Sparse, seconds: f64) -> Outcome {
