@@ -14,7 +14,7 @@ const SCENE: &str = r#"<scene version="3.0.0">
     <bsdf type="twosided" id="wall"><bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.5, 0.3"/></bsdf></bsdf>
     <bsdf type="roughplastic" id="block"><float name="alpha" value="0.3"/><rgb name="diffuse_reflectance" value="0.2, 0.4, 0.7"/></bsdf>
     <shape type="cube" id="room"><transform name="to_world"><scale value="2"/></transform><ref id="wall"/></shape>
-    <shape type="cube" id="block"><transform name="to_world"><scale x="0.5" y="0.7" z="0.4"/><rotate y="1" angle="30"/>
+    <shape type="cube" id="box"><transform name="to_world"><scale x="0.5" y="0.7" z="0.4"/><rotate y="1" angle="30"/>
       <translate x="0.2" y="-1.3" z="-0.5"/></transform><ref id="block"/></shape>
     <shape type="rectangle" id="lamp"><transform name="to_world"><rotate x="1" angle="90"/><scale value="0.6"/><translate y="1.9"/></transform>
       <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="6"/></emitter></shape>

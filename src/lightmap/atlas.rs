@@ -100,9 +100,9 @@ impl Atlas {
         Ok(Self { size, texel, charts, triangle_chart, seams })
     }
 
-    /// Corners of a triangle in texels of the image; `None` for a triangle without a chart.
+    /// Corners of a triangle in texels of the image; `None` for a triangle without a chart, as those are that came later.
     pub fn corners(&self, geometry: &Geometry, triangle: u32) -> Option<[Vec2; 3]> {
-        let chart = self.charts.get(self.triangle_chart[triangle as usize] as usize)?;
+        let chart = self.charts.get(*self.triangle_chart.get(triangle as usize)? as usize)?;
         Some(geometry.corners(triangle).map(|p| chart.project(p)))
     }
 }
