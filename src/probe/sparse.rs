@@ -84,6 +84,10 @@ pub struct Sparse {
     pub seen: f64,
 }
 
+/// Most candidates a probe, and most of them where probes are few: more take time, and change nothing.
+const CROWD: usize = 256;
+const LEAST_CROWD: usize = 8192;
+
 /// A place of the surfaces, and how badly it is served by the probes that there are.
 pub type Need = (Vec3, f32);
 
@@ -118,7 +122,7 @@ pub fn place(
 ) -> Result<Sparse> {
     let sides = &reachable.sides;
     progress.start("placing", 2);
-    let candidates = candidates(&reachable.space);
+    let candidates = enough(candidates(&reachable.space), params.count);
     if candidates.is_empty() {
         return Err(Error::Request("no voxel of the free space is empty: give another --path or --bounds".into()));
     }
@@ -162,4 +166,11 @@ pub fn candidates(space: &Space) -> Vec<Vec3> {
     };
     let near = within(NEXT * voxels.edge);
     if near.is_empty() { within(f32::INFINITY) } else { near }
+}
+
+/// Every so-manieth of the candidates, where they are far more than there are probes to choose.
+fn enough(candidates: Vec<Vec3>, count: u32) -> Vec<Vec3> {
+    let most = (CROWD * count as usize).max(LEAST_CROWD);
+    let step = candidates.len().div_ceil(most).max(1);
+    candidates.into_iter().step_by(step).collect()
 }

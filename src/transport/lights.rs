@@ -28,6 +28,8 @@ pub struct Lights {
     pub(crate) environments: Vec<Environment>,
     /// Directional emitters: indices into `Scene::emitters`.
     pub(crate) suns: Vec<u32>,
+    /// Whether a ray may meet light: there is an area light that is not dark, or an environment.
+    pub(crate) may_be_met: bool,
 }
 
 /// An emitter, or a part of one, at a finite distance.
@@ -68,6 +70,7 @@ impl Lights {
         for (i, emitter) in scene.emitters.iter().enumerate() {
             match emitter {
                 Emitter::Area { object, radiance } => {
+                    this.may_be_met |= radiance.mean() != Rgb::ZERO;
                     let object = &scene.geometry.objects[*object as usize];
                     let mean = luminance(radiance.mean());
                     if mean > 0.0 && mean.is_finite() {
@@ -109,6 +112,7 @@ impl Lights {
             }
         }
         this.tree = LightTree::new(&bounds);
+        this.may_be_met |= !this.environments.is_empty();
         this
     }
 

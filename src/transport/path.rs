@@ -225,6 +225,10 @@ fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, 
     let [x, y, lobe, _] = sampler.next_4d();
     let from = vertex.receiver();
     let mut sum = vertex.direct(&from, light_choice, Vec2::new(light_x, light_y));
+    // Direct light alone, and no ray could meet any.
+    if params.max_depth == 1 && !vertex.world.lights.may_be_met {
+        return keep_finite(sum);
+    }
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
         let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
         let start = Start { ray, from, pdf: sample.pdf, delta: sample.delta, eta: sample.eta, depth: 1 };

@@ -85,8 +85,15 @@ impl Lighting {
         Self { transport, reflectance, changing, normals }
     }
 
-    /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2).
-    pub fn light(&self, world: &World, params: &RadianceProbeParams, seed: u32, clock: &mut Clock) -> Light {
+    /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2). `before`: indirect light that bounces go on
+    /// from, of the frame before (§4.2); none for darkness.
+    pub fn light(
+        &self,
+        world: &World,
+        params: &RadianceProbeParams,
+        (before, seed): (Option<Vec<Rgb>>, u32),
+        clock: &mut Clock,
+    ) -> Light {
         let transport = &self.transport;
         let mut reflectances = Cow::Borrowed(&self.reflectance);
         if !self.changing.is_empty() {
@@ -99,7 +106,7 @@ impl Lighting {
         clock.lap("scene relight");
         let hits = transport.hits_in(world);
         let rows = transport.params.receiver.rows();
-        let mut indirect = vec![Rgb::ZERO; direct.len() * rows];
+        let mut indirect = before.unwrap_or_else(|| vec![Rgb::ZERO; direct.len() * rows]);
         for _ in 0..params.bounces {
             let radiance = radiance(&direct, &self.irradiance(&indirect), &reflectances);
             let lambda = transport.probe_radiance(&hits, &radiance);

@@ -86,11 +86,14 @@ pub struct RadianceProbeParams {
     pub map_samples: u32,
     /// How often light goes from the receivers to the probes and back.
     pub bounces: u32,
+    /// Whether it goes on from the light of the frame before. *Paper* (§4.2): yes, and once a frame. *Ours*: frames are lit by themselves, so that
+    /// light that is switched on is there at once, and any frame can be made alone.
+    pub feedback: bool,
 }
 
 impl Default for RadianceProbeParams {
     fn default() -> Self {
-        Self { supersample: 1, direct_samples: 8, map_samples: 4, bounces: 4 }
+        Self { supersample: 1, direct_samples: 8, map_samples: 4, bounces: 4, feedback: false }
     }
 }
 

@@ -1,15 +1,17 @@
 //! Radiance probes in the table of methods.
 
-use super::light::Lighting;
+use super::light::{Light, Lighting};
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
 use super::shade::{Indirect, Shading};
 use crate::Result;
 use crate::base::clock::Clock;
+use crate::base::math::Rgb;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
 use crate::scene::Animation;
+use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
 use serde_json::Value;
@@ -41,23 +43,50 @@ struct OnCpu<'a> {
     setup: Setup<'a>,
     lighting: Lighting,
     params: RadianceProbeParams,
+    /// The last frame that was lit, and its indirect light, where the next goes on from that.
+    last: Option<(u32, Vec<Rgb>)>,
 }
 
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
     let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
-    Ok(Box::new(OnCpu { setup: *setup, lighting: Lighting::new(setup.world, transport, &changed), params: setup.parameters()? }))
+    let lighting = Lighting::new(setup.world, transport, &changed);
+    Ok(Box::new(OnCpu { setup: *setup, lighting, params: setup.parameters()?, last: None }))
+}
+
+impl OnCpu<'_> {
+    /// The light of a frame; with feedback, that of all frames before it comes first, whichever of them are asked for.
+    fn light(&mut self, view: &View, world: &World, clock: &mut Clock) -> Light {
+        let seed = self.setup.seed;
+        if !self.params.feedback {
+            return self.lighting.light(world, &self.params, (None, seed), clock);
+        }
+        let (from, mut before) = match self.last.take() {
+            Some((frame, light)) if frame < view.frame => (frame + 1, Some(light)),
+            _ => (0, None),
+        };
+        for frame in from..view.frame {
+            let earlier = View { frame, camera: view.camera.clone() };
+            let of_frame = self.setup.world_at(&earlier);
+            let world = of_frame.as_ref().unwrap_or(self.setup.world);
+            before = Some(self.lighting.light(world, &self.params, (before, seed), &mut Clock::start()).indirect);
+        }
+        clock.restart();
+        let light = self.lighting.light(world, &self.params, (before, seed), clock);
+        self.last = Some((view.frame, light.indirect.clone()));
+        light
+    }
 }
 
 impl Renderer for OnCpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
-        let mut clock = Clock::start();
-        let of_frame = self.setup.world_at(view);
+        let (mut clock, setup) = (Clock::start(), self.setup);
+        let of_frame = setup.world_at(view);
         if of_frame.is_some() {
             clock.lap("world");
         }
-        let world = of_frame.as_ref().unwrap_or(self.setup.world);
-        let light = self.lighting.light(world, &self.params, self.setup.seed, &mut clock);
+        let world = of_frame.as_ref().unwrap_or(setup.world);
+        let light = self.light(view, world, &mut clock);
         let indirect = Indirect::new(&self.lighting.transport, world, &light);
         clock.lap("light map");
         let baseline = Baseline::new(world, None, self.params.supersample);

@@ -92,7 +92,7 @@ fn traced(world: &World, transport: &Transport, receivers: &[u32], samples: u32)
 /// RMS difference in green of what probes say of some receivers, relative to the RMS of the light itself.
 fn error(world: &World, transport: Transport, receivers: &[u32], expected: &[Rgb]) -> f32 {
     let params = RadianceProbeParams { bounces: 12, map_samples: 64, ..RadianceProbeParams::default() };
-    let found = Lighting::new(world, transport, &[]).light(world, &params, 1, &mut Clock::start()).indirect;
+    let found = Lighting::new(world, transport, &[]).light(world, &params, (None, 1), &mut Clock::start()).indirect;
     let wrong: f32 = receivers.iter().zip(expected).map(|(&r, e)| (found[r as usize].y - e.y).powi(2)).sum();
     (wrong / expected.iter().map(|e| e.y * e.y).sum::<f32>()).sqrt()
 }

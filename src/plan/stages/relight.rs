@@ -48,6 +48,11 @@ impl Relight {
     fn params(&self) -> Result<RadianceProbeParams> {
         let params = apply(&RadianceProbeParams::default(), &self.set)?;
         params.validate()?;
+        if params.feedback {
+            return Err(Error::Request(
+                "--set feedback=true: light maps have all bounces of their own frame; give bounces=N".into(),
+            ));
+        }
         Ok(params)
     }
 
@@ -92,7 +97,7 @@ impl Relight {
                 let of_frame = animation.as_ref().map(|animation| world.at(animation, frame));
                 let world = of_frame.as_ref().unwrap_or(&world);
                 let mut clock = Clock::start();
-                let light = lighting.light(world, &params, cx.seed, &mut clock);
+                let light = lighting.light(world, &params, (None, cx.seed), &mut clock);
                 let values = if self.indirect { light.indirect } else { total(&light) };
                 let map = as_light_map(&lighting.transport, world, &values);
                 clock.lap("light map");
