@@ -49,6 +49,9 @@ STAGES = {
     "bake-lightmap": ("lightmap.exr", "bake-lightmap scene.xml --texels 4000 --spp 16 --first-spp 4 -o lightmap.exr"),
     "bake-probes": ("probes", "bake-probes scene.xml --probes probes.json --qhmap qhmap --lightmap lightmap.exr --spp 8 -o probes"),
     "bake-lightfield": ("lightfield", "bake-lightfield scene.xml --probes probes.json --size 32 --spp 2 --bounces 2 -o lightfield"),
+    "bake-transport": ("transport", "bake-transport scene.xml --probes probes.json --texels 1500 --rays 64 --relight-rays 500 -o transport"),
+    "relight": ("lightmaps", "relight scene.xml --probes transport -o lightmaps"),
+    "radiance-probes": ("lit", "render-path scene.xml --path path.json --method radiance-probes --probes transport -o lit"),
     "light-field-probes": ("views", "render-path scene.xml --path path.json --method light-field-probes --probes lightfield -o views"),
     "render-path": ("frames", "render-path scene.xml --path path.json --probes probes --lightmap lightmap.exr --curvature curvature.exr -o frames"),
     "path-trace": ("reference", "render-path scene.xml --path path.json --method path-trace --spp 8 -o reference"),
@@ -56,7 +59,7 @@ STAGES = {
 }
 # Which stages read a stage's output.
 READERS = {
-    "place-probes": ["resmap", "bake-probes", "bake-lightfield"],
+    "place-probes": ["resmap", "bake-probes", "bake-lightfield", "bake-transport"],
     "resmap": ["qhmap"],
     "qhmap": ["bake-probes"],
     "curvature": ["render-path"],
@@ -64,6 +67,9 @@ READERS = {
     "bake-probes": ["render-path"],
     "bake-lightfield": ["light-field-probes"],
     "light-field-probes": [],
+    "bake-transport": ["relight", "radiance-probes"],
+    "relight": [],
+    "radiance-probes": [],
     "render-path": ["compare"],
     "path-trace": ["compare"],
     "compare": [],
