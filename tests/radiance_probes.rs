@@ -82,6 +82,12 @@ fn frames_have_the_light_of_path_tracing_whatever_moves() {
         let mean = |p: &[Rgb]| p.iter().map(|c| c.y).sum::<f32>() / 36.0;
         assert!((mean(&ours) / mean(&theirs) - 1.0).abs() < 0.04, "frame {frame}: {} for {}", mean(&ours), mean(&theirs));
     }
+    // Paths along the lobes read the receivers' light: the glossy layer is there as well.
+    f.success(&format!(
+        "{RENDER} --probes transport --lights lights.json --frames 1 --set gloss_samples=64 --set bounces=8 -o gloss"
+    ));
+    let gloss = |folder: &str| layer(&f, &format!("{folder}/0001.exr"), "glossy").iter().map(|c| c.y).sum::<f32>();
+    assert!((gloss("gloss") / gloss("reference") - 1.0).abs() < 0.1, "{} for {}", gloss("gloss"), gloss("reference"));
     let red = |frame: &str| layer(&f, frame, "diffuse").iter().map(|c| c.y / c.x.max(1e-6)).sum::<f32>() / 864.0;
     assert!(red("frames/0002.exr") < 0.8 * red("frames/0000.exr"), "walls turn red");
 }

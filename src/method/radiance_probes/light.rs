@@ -131,11 +131,11 @@ impl Lighting {
         };
         Cow::Owned(kept.par_chunks_exact(4).zip(&self.normals).map(of).collect())
     }
-}
 
-/// E_T of receivers that keep irradiance, from emitters and by way of the probes.
-pub fn total(light: &Light) -> Vec<Rgb> {
-    light.direct.iter().zip(&light.indirect).map(|(&d, i)| d + i.max(Rgb::ZERO)).collect()
+    /// E_T of all light, from emitters and by way of the probes.
+    pub fn total(&self, light: &Light) -> Vec<Rgb> {
+        light.direct.iter().zip(self.irradiance(&light.indirect).iter()).map(|(&d, i)| d + i.max(Rgb::ZERO)).collect()
+    }
 }
 
 /// Diffuse radiance that receivers send out.

@@ -82,6 +82,9 @@ pub struct RadianceProbeParams {
     pub supersample: u32,
     /// Samples of direct light, a pixel of the G-buffer; 0 leaves it out.
     pub direct_samples: u32,
+    /// Paths along the glossy lobes, a pixel of the G-buffer, lit by the receivers' light where they meet diffuse surfaces; with 0 the glossy
+    /// layer has direct light, and what receivers that keep sh1 say. *Ours*: the paper's frames have no other reflections.
+    pub gloss_samples: u32,
     /// Samples of direct light, a receiver.
     pub map_samples: u32,
     /// How often light goes from the receivers to the probes and back.
@@ -93,7 +96,7 @@ pub struct RadianceProbeParams {
 
 impl Default for RadianceProbeParams {
     fn default() -> Self {
-        Self { supersample: 1, direct_samples: 8, map_samples: 4, bounces: 4, feedback: false }
+        Self { supersample: 1, direct_samples: 8, gloss_samples: 0, map_samples: 4, bounces: 4, feedback: false }
     }
 }
 
@@ -101,6 +104,7 @@ impl Parameters for RadianceProbeParams {
     fn validate(&self) -> Result<()> {
         within("supersample", self.supersample, 1..=MOST_SUPERSAMPLES)?;
         within("direct_samples", self.direct_samples, 0..=1 << 16)?;
+        within("gloss_samples", self.gloss_samples, 0..=1 << 16)?;
         within("map_samples", self.map_samples, 1..=1 << 16)?;
         within("bounces", self.bounces, 0..=64)
     }

@@ -1,6 +1,6 @@
 //! Radiance probes in the table of methods.
 
-use super::light::{Light, Lighting};
+use super::light::{Light, Lighting, as_light_map};
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
 use super::shade::{Indirect, Shading};
@@ -87,11 +87,20 @@ impl Renderer for OnCpu<'_> {
         }
         let world = of_frame.as_ref().unwrap_or(setup.world);
         let light = self.light(view, world, &mut clock);
-        let indirect = Indirect::new(&self.lighting.transport, world, &light);
+        let transport = &self.lighting.transport;
+        let indirect = Indirect::new(transport, world, &light);
+        let all = (self.params.gloss_samples > 0).then(|| as_light_map(transport, world, &self.lighting.total(&light)));
         clock.lap("light map");
         let baseline = Baseline::new(world, None, self.params.supersample);
         let g = baseline.gbuffer(&view.camera, &mut clock);
-        let shading = Shading { world, indirect: &indirect, params: &self.params, seed: self.setup.seed, frame: view.frame };
+        let shading = Shading {
+            world,
+            indirect: &indirect,
+            total: all.as_ref(),
+            params: &self.params,
+            seed: setup.seed,
+            frame: view.frame,
+        };
         let diffuse = shading.diffuse(&g);
         clock.lap("diffuse");
         let glossy = shading.glossy(&g);

@@ -6,9 +6,11 @@ use super::params::RadianceProbeParams;
 use super::transport::{Kept, first_four};
 use crate::base::math::{Basis, Rgb, hash_words, luminance};
 use crate::lightmap::LightMap;
+use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
 use crate::material::bsdf::{Lobes, Query};
-use crate::transport::World;
+use crate::transport::path::{PathParams, scattered};
+use crate::transport::{Sampler, World};
 use crate::view::direct::direct;
 use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel};
 use glam::{Vec2, Vec3};
@@ -18,8 +20,8 @@ use std::f32::consts::{FRAC_1_PI, PI};
 /// Directions by which light of first order is taken in.
 const DIRECTIONS: u32 = 16;
 
-/// Branches of a pixel's random stream: direct light of either layer.
-const BRANCHES: [u32; 2] = [1, 2];
+/// Branches of a pixel's random stream: direct light of either layer, and paths along glossy lobes.
+const BRANCHES: [u32; 3] = [1, 2, 3];
 
 /// Light that comes by way of the probes, where pixels look it up.
 pub enum Indirect {
@@ -48,6 +50,8 @@ pub struct Shading<'a> {
     pub world: &'a World,
     /// Light by way of the probes.
     pub indirect: &'a Indirect,
+    /// All light of the receivers, where glossy paths read it.
+    pub total: Option<&'a LightMap>,
     /// How.
     pub params: &'a RadianceProbeParams,
     /// Seed of the random numbers.
@@ -71,11 +75,15 @@ impl Shading<'_> {
         })
     }
 
-    /// The glossy layer: direct light, and where receivers keep sh1 the linear terms of theirs as one distant light (§5.1, after Sloan 2008).
+    /// The glossy layer: paths along the lobes that read diffuse light from the receivers; without any, direct light, and where receivers keep
+    /// sh1 the linear terms of theirs as one distant light (§5.1, after Sloan 2008).
     pub fn glossy(&self, view: &GBuffer) -> Vec<Rgb> {
         self.layer(view, |p, stream| {
             if p.alpha.is_none() {
                 return Rgb::ZERO;
+            }
+            if let Some(total) = self.total {
+                return self.along_lobes(p, total, hash_words(&[stream, BRANCHES[2]]));
             }
             let straight = direct(self.world, p, GLOSSY, self.params.direct_samples, hash_words(&[stream, BRANCHES[1]]));
             straight
@@ -92,6 +100,13 @@ impl Shading<'_> {
             pixel.as_ref().map_or(Rgb::ZERO, |p| of(p, stream))
         };
         view.pixels.par_iter().enumerate().with_min_len(view.size()[0]).map(pixel).collect()
+    }
+
+    fn along_lobes(&self, p: &Pixel, total: &LightMap, stream: u32) -> Rgb {
+        let known = |s: &Surface, wo: Vec3| total.diffuse_radiance(&self.world.scene, s, wo);
+        let path = PathParams::default();
+        let sample = |i| scattered(self.world, &p.surface, p.wo, GLOSSY, Some(&known), &path, &mut Sampler::new(stream, i));
+        (0..self.params.gloss_samples).map(sample).sum::<Rgb>() / self.params.gloss_samples as f32
     }
 
     /// Diffuse reflection of light of first order. *Ours*: by directions in place of the two factors of Ramamoorthi and Hanrahan 2001, so that

@@ -6,7 +6,7 @@ use crate::io::Provenance;
 use crate::io::jobs::is_finished;
 use crate::io::provenance::hash_file;
 use crate::lightmap::lookup::encode;
-use crate::method::radiance_probes::light::{Lighting, as_light_map, total};
+use crate::method::radiance_probes::light::{Lighting, as_light_map};
 use crate::method::radiance_probes::operator::Transport;
 use crate::method::radiance_probes::params::RadianceProbeParams;
 use crate::method::radiance_probes::transport::Kept;
@@ -98,7 +98,7 @@ impl Relight {
                 let world = of_frame.as_ref().unwrap_or(&world);
                 let mut clock = Clock::start();
                 let light = lighting.light(world, &params, (None, cx.seed), &mut clock);
-                let values = if self.indirect { light.indirect } else { total(&light) };
+                let values = if self.indirect { light.indirect } else { lighting.total(&light) };
                 let map = as_light_map(&lighting.transport, world, &values);
                 clock.lap("light map");
                 times.passes(&clock.laps);
