@@ -119,18 +119,22 @@ impl Pipeline {
                 ..Default::default()
             }
             .into(),
-            BakeLightfield {
-                scene: scene(),
-                probes: bakes.grid.clone(),
-                // As many texels as the other probes have, or about.
-                size: Some((s.probe_size.0[0] * s.probe_size.0[1]).isqrt().next_power_of_two()),
-                output: bakes.lightfield.clone(),
-                ..Default::default()
-            }
-            .into(),
+            self.lightfield(bakes).into(),
             BakeTransport { scene: scene(), probes: bakes.grid.clone(), output: bakes.transport.clone(), ..Default::default() }
                 .into(),
         ]
+    }
+
+    fn lightfield(&self, bakes: &Bakes) -> BakeLightfield {
+        let [width, height] = self.settings.probe_size.0;
+        BakeLightfield {
+            scene: self.scene.clone(),
+            probes: bakes.grid.clone(),
+            // As many texels as the other probes have, or about.
+            size: Some((width * height).isqrt().next_power_of_two()),
+            output: bakes.lightfield.clone(),
+            ..Default::default()
+        }
     }
 
     /// Frames by `method`, from what it reads of `bakes`.
