@@ -26,7 +26,7 @@ pub enum Interpolation {
     /// In the receiver's own directions, whatever probes see there (Eq. 1).
     Spatial,
     /// What Arikan et al. 2005 part, without the flaws of an implementation (Fig. 8): near surfaces as with `visible`, all others as with
-    /// `spatial`, but where near ones stand before them. *Reading*: near is what lies within half the radius of the probes' support.
+    /// `spatial`, but where near ones stand before them. *Reading*: near is what is nearer than the nearest probe.
     Decomposed,
 }
 
@@ -166,7 +166,9 @@ impl Gather {
             return plain(parts);
         }
         let Some(hit) = ground.world.intersect(&surface.spawn(d)) else { return };
-        if self.interpolation == Interpolation::Decomposed && hit.t > 0.5 * ground.radius {
+        let nearest =
+            || support.iter().map(|&(i, _)| surface.p.distance(ground.probes[i as usize])).fold(f32::INFINITY, f32::min);
+        if self.interpolation == Interpolation::Decomposed && hit.t > nearest() {
             return plain(parts);
         }
         let Some(seen) = ground.receivers.at(&hit, -d).map(|r| ground.seen(r)) else { return };
