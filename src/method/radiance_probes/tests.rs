@@ -59,11 +59,15 @@ fn surfaces_that_all_send_out_the_same_light_give_pi_times_that() {
         let light = transport
             .receive(&transport.probe_radiance(&transport.hits, &vec![Rgb::new(1.0, 2.0, 0.5); transport.receivers.len()]));
         let mean: Rgb = light.iter().sum::<Rgb>() / light.len() as f32;
-        // A few rays end at the lamp's back or at texels that are none.
-        assert!((mean.x - PI).abs() < 0.1, "{interpolation}: {mean}");
         assert!((mean.y - 2.0 * mean.x).abs() < 1e-3 && (mean.z - 0.5 * mean.x).abs() < 1e-3, "{mean}");
-        let far = light.iter().filter(|l| (l.x - PI).abs() > 0.1 * PI).count();
-        assert!(far < light.len() / 25, "{interpolation}: {far} of {}", light.len());
+        let mut sorted: Vec<f32> = light.iter().map(|l| l.x).collect();
+        sorted.sort_by(f32::total_cmp);
+        let median = sorted[sorted.len() / 2];
+        assert!((median - PI).abs() < 0.02 * PI, "{interpolation}: {median}");
+        // What no probe sees, beside the lamp and behind the box, sends none: some light is lost, and none is made.
+        let lost = 1.0 - mean.x / PI;
+        let most = if interpolation == Interpolation::Spatial { 0.005 } else { 0.06 };
+        assert!((-0.005..most).contains(&lost), "{interpolation}: {lost}");
     }
 }
 
@@ -116,7 +120,7 @@ fn light_tends_to_path_tracing_and_is_nearer_than_other_interpolations() {
     let fine = error(&world, first, &receivers, &expected);
     assert!(fine < 0.1, "{fine}");
     let orders = [0, 2, 7].map(|order| of(2, order, Interpolation::Visible));
-    assert!(orders[0] > 1.2 * orders[1] && orders[1] > orders[2] && orders[2] > fine, "{orders:?} {fine}");
+    assert!(orders[0] > orders[1] && orders[1] > 2.0 * orders[2] && orders[2] > fine, "{orders:?} {fine}");
     let [spatial, decomposed] = [Interpolation::Spatial, Interpolation::Decomposed].map(|i| of(2, 7, i));
     assert!(orders[2] < decomposed && decomposed < spatial, "{} {decomposed} {spatial}", orders[2]);
 }
@@ -132,7 +136,7 @@ fn more_is_lost_on_the_way_to_few_probes_and_back() {
     };
     let [one, eight, many, blurred] = [mean(1, 7), mean(2, 7), mean(3, 7), mean(2, 1)];
     assert!(one > eight && eight > many && blurred > eight, "{one} {eight} {many} {blurred}");
-    assert!(many < 0.35, "{many}");
+    assert!(many < 0.5, "most of it comes back: {many}");
 }
 
 #[test]
