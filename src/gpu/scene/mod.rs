@@ -199,6 +199,11 @@ impl GpuScene {
         [&self.tree, &self.facets, &self.words, &self.records].map(wgpu::Buffer::size).iter().sum()
     }
 
+    /// The buffer that the light map lies in, and the word where it begins: three floats a texel, all of the front and then of the back.
+    pub(crate) fn light_words(&self) -> (&wgpu::Buffer, u32) {
+        (&self.words, self.params.light_front)
+    }
+
     /// Whether there is a light map to look diffuse light up in.
     pub(crate) fn has_lightmap(&self) -> bool {
         self.params.light_width > 0

@@ -77,6 +77,11 @@ impl Lighting {
         Self { transport, reflectance, changing }
     }
 
+    /// What of E_T each receiver sends on as diffuse radiance, in the scene's own colours.
+    pub fn reflectance(&self) -> &[Rgb] {
+        &self.reflectance
+    }
+
     /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2).
     pub fn light(&self, world: &World, params: &RadianceProbeParams, seed: u32, clock: &mut Clock) -> Light {
         let transport = &self.transport;
@@ -96,7 +101,9 @@ impl Lighting {
             let radiance = radiance(&direct, &indirect, rows, &reflectances);
             let lambda = transport.probe_radiance(&hits, &radiance);
             clock.lap("probe relight");
-            indirect = transport.receive(&lambda);
+            let spaces = transport.project(&lambda);
+            clock.lap("cluster projection");
+            indirect = transport.reconstruct(&spaces);
             clock.lap("receivers");
         }
         Light { direct, indirect }

@@ -1,13 +1,16 @@
 //! Radiance probes in the table of methods.
 
-use super::light::{Light, Lighting, as_light_map};
+use super::frame_map::FrameMap;
+use super::gpu::RadianceProbesOnGpu;
+use super::light::{Light, Lighting};
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
-use crate::Result;
+use super::transport::Kept;
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
+use crate::gpu::Gpu;
 use crate::lightmap::LightMap;
 use crate::material::bsdf::{Lobes, Query};
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
@@ -17,8 +20,10 @@ use crate::view::View;
 use crate::view::baseline::Baseline;
 use crate::view::direct::direct;
 use crate::view::gbuffer::{GBuffer, Pixel};
+use crate::{Error, Result};
 use rayon::prelude::*;
 use serde_json::Value;
+use std::sync::Arc;
 
 /// The row.
 pub const METHOD: Method = Method {
@@ -34,7 +39,7 @@ pub const METHOD: Method = Method {
     parameters,
     for_scene: as_given,
     cpu,
-    gpu: None,
+    gpu: Some(gpu),
 };
 
 fn parameters(options: &Options) -> Result<Value> {
@@ -46,13 +51,27 @@ fn parameters(options: &Options) -> Result<Value> {
 struct OnCpu<'a> {
     setup: Setup<'a>,
     lighting: Lighting,
+    map: FrameMap,
     params: RadianceProbeParams,
 }
 
+/// The operator that the probes' folder holds.
+fn transport(setup: &Setup) -> Result<Transport> {
+    let folder = setup.required_probes()?;
+    let transport = Transport::load(&folder, &setup.world.scene)?;
+    match transport.params.receiver {
+        Kept::Irradiance => Ok(transport),
+        Kept::Sh1 => {
+            Err(Error::input(&folder, "its receivers keep sh1, frames need irradiance: bake with --receiver irradiance"))
+        }
+    }
+}
+
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
     let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
-    Ok(Box::new(OnCpu { setup: *setup, lighting: Lighting::new(setup.world, transport, &changed), params: setup.parameters()? }))
+    let lighting = Lighting::new(setup.world, transport(setup)?, &changed);
+    let map = FrameMap::new(&setup.world.scene.geometry, &lighting.transport);
+    Ok(Box::new(OnCpu { setup: *setup, lighting, map, params: setup.parameters()? }))
 }
 
 impl OnCpu<'_> {
@@ -78,7 +97,7 @@ impl Renderer for OnCpu<'_> {
         }
         let world = of_frame.as_ref().unwrap_or(self.setup.world);
         let Light { indirect, .. } = self.lighting.light(world, &self.params, self.setup.seed, &mut clock);
-        let map = as_light_map(&self.lighting.transport, world, &indirect);
+        let map = self.map.lit(&indirect);
         clock.lap("light map");
         let baseline = Baseline::new(world, None, self.params.supersample);
         let g = baseline.gbuffer(&view.camera, &mut clock);
@@ -92,5 +111,34 @@ impl Renderer for OnCpu<'_> {
 
     fn probe_bytes(&self) -> [u64; 2] {
         [self.lighting.transport.bytes() as u64, 0]
+    }
+}
+
+struct OnGpu {
+    probes: RadianceProbesOnGpu,
+    seed: u32,
+}
+
+fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    setup.refuse_animation("a GPU with radiance probes")?;
+    let lighting = Lighting::new(setup.world, transport(setup)?, &[]);
+    let piece = gpu.adapter.max_binding;
+    let probes = RadianceProbesOnGpu::new(gpu, setup.world, &lighting, &setup.parameters()?, piece)?;
+    Ok(Box::new(OnGpu { probes, seed: setup.seed }))
+}
+
+impl Renderer for OnGpu {
+    fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
+        let frame = self.probes.frame(&view.camera, self.seed, view.frame)?;
+        progress.advance(view.camera.size[1].into());
+        Ok(Frame::of(frame.layers, frame.passes))
+    }
+
+    fn gpu(&self) -> Option<(&str, bool)> {
+        Some((self.probes.device(), self.probes.has_clock()))
+    }
+
+    fn probe_bytes(&self) -> [u64; 2] {
+        [0, self.probes.probe_bytes()]
     }
 }
