@@ -52,6 +52,11 @@ impl DirectLight {
         Ok(Self(Kernel::in_scene(scene, &DIRECT_LIGHT, &[])?))
     }
 
+    /// Takes another scene of the same triangles.
+    pub(crate) fn rebind(&mut self, scene: &GpuScene) {
+        self.0.rebind(scene);
+    }
+
     /// Adds the mean of so many samples a pixel to the view's diffuse light, whose random streams follow from seed and frame.
     pub(crate) fn run(
         &self,

@@ -1,7 +1,7 @@
 //! The light map that a frame looks indirect light up in. What fills its gutters is the same in every frame.
 //!
 //! *Ours*: seams of charts are left as they are, in contrast to a light map that is written to a file: light that comes by way of a few
-//! numbers a cluster has no noise, and hardly jumps there.
+//! numbers a cluster has no noise, and hardly jumps there (closing them changes display values in the room, at texels of 8 cm, by 0.0007 RMS).
 
 use super::operator::Transport;
 use crate::base::math::Rgb;

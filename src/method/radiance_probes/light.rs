@@ -77,21 +77,27 @@ impl Lighting {
         Self { transport, reflectance, changing }
     }
 
-    /// What of E_T each receiver sends on as diffuse radiance, in the scene's own colours.
-    pub fn reflectance(&self) -> &[Rgb] {
-        &self.reflectance
+    /// What of E_T each receiver sends on as diffuse radiance in a frame, whose world this is.
+    pub fn reflectances(&self, world: &World) -> Cow<'_, [Rgb]> {
+        let mut all = Cow::Borrowed(self.reflectance.as_slice());
+        if !self.changing.is_empty() {
+            let of = |&r: &u32| reflectance(world, &self.transport.receivers[r as usize]);
+            let changed: Vec<Rgb> = self.changing.par_iter().with_min_len(64).map(of).collect();
+            let all = all.to_mut();
+            self.changing.iter().zip(changed).for_each(|(&r, value)| all[r as usize] = value);
+        }
+        all
+    }
+
+    /// Whether frames differ in what receivers send on.
+    pub fn changes(&self) -> bool {
+        !self.changing.is_empty()
     }
 
     /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2).
     pub fn light(&self, world: &World, params: &RadianceProbeParams, seed: u32, clock: &mut Clock) -> Light {
         let transport = &self.transport;
-        let mut reflectances = Cow::Borrowed(&self.reflectance);
-        if !self.changing.is_empty() {
-            let of = |&r: &u32| reflectance(world, &transport.receivers[r as usize]);
-            let changed: Vec<Rgb> = self.changing.par_iter().with_min_len(64).map(of).collect();
-            let all = reflectances.to_mut();
-            self.changing.iter().zip(changed).for_each(|(&r, value)| all[r as usize] = value);
-        }
+        let reflectances = self.reflectances(world);
         let direct = direct(world, &transport.receivers, params.map_samples, seed);
         clock.lap("scene relight");
         let hits = transport.hits_in(world);

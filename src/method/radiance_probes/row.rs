@@ -55,21 +55,8 @@ struct OnCpu<'a> {
     params: RadianceProbeParams,
 }
 
-/// The operator that the probes' folder holds.
-fn transport(setup: &Setup) -> Result<Transport> {
-    let folder = setup.required_probes()?;
-    let transport = Transport::load(&folder, &setup.world.scene)?;
-    match transport.params.receiver {
-        Kept::Irradiance => Ok(transport),
-        Kept::Sh1 => {
-            Err(Error::input(&folder, "its receivers keep sh1, frames need irradiance: bake with --receiver irradiance"))
-        }
-    }
-}
-
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
-    let lighting = Lighting::new(setup.world, transport(setup)?, &changed);
+    let lighting = lighting(setup)?;
     let map = FrameMap::new(&setup.world.scene.geometry, &lighting.transport);
     Ok(Box::new(OnCpu { setup: *setup, lighting, map, params: setup.parameters()? }))
 }
@@ -114,24 +101,46 @@ impl Renderer for OnCpu<'_> {
     }
 }
 
-struct OnGpu {
+struct OnGpu<'a> {
+    setup: Setup<'a>,
+    /// Where lights or colours change.
+    lighting: Option<Lighting>,
     probes: RadianceProbesOnGpu,
-    seed: u32,
+}
+
+/// The lighting of a setup's frames.
+fn lighting(setup: &Setup) -> Result<Lighting> {
+    let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
+    let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
+    Ok(Lighting::new(setup.world, transport, &changed))
 }
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    setup.refuse_animation("a GPU with radiance probes")?;
-    let lighting = Lighting::new(setup.world, transport(setup)?, &[]);
+    let lighting = lighting(setup)?;
+    if lighting.transport.params.receiver != Kept::Irradiance {
+        let message =
+            "the GPU's radiance probes have receivers of irradiance alone (bake-transport --receiver); use --device cpu";
+        return Err(Error::Request(message.into()));
+    }
     let piece = gpu.adapter.max_binding;
-    let probes = RadianceProbesOnGpu::new(gpu, setup.world, &lighting, &setup.parameters()?, piece)?;
-    Ok(Box::new(OnGpu { probes, seed: setup.seed }))
+    let mut probes = RadianceProbesOnGpu::new(gpu, setup.world, &lighting, &setup.parameters()?, piece)?;
+    // What the GPU lacks shows in any frame.
+    if let Some(world) = setup.views.first().and_then(|view| setup.world_at(view)) {
+        probes.relight(&world, &lighting)?;
+    }
+    Ok(Box::new(OnGpu { setup: *setup, lighting: setup.animation.map(|_| lighting), probes }))
 }
 
-impl Renderer for OnGpu {
+impl Renderer for OnGpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
-        let frame = self.probes.frame(&view.camera, self.seed, view.frame)?;
+        let mut clock = Clock::start();
+        if let Some((world, lighting)) = self.setup.world_at(view).zip(self.lighting.as_ref()) {
+            self.probes.relight(&world, lighting)?;
+            clock.lap("world");
+        }
+        let frame = self.probes.frame(&view.camera, self.setup.seed, view.frame)?;
         progress.advance(view.camera.size[1].into());
-        Ok(Frame::of(frame.layers, frame.passes))
+        Ok(Frame::of(frame.layers, [clock.laps, frame.passes].concat()))
     }
 
     fn gpu(&self) -> Option<(&str, bool)> {
@@ -139,6 +148,7 @@ impl Renderer for OnGpu {
     }
 
     fn probe_bytes(&self) -> [u64; 2] {
-        [0, self.probes.probe_bytes()]
+        let host = self.lighting.as_ref().map_or(0, |lighting| lighting.transport.bytes());
+        [host as u64, self.probes.probe_bytes()]
     }
 }

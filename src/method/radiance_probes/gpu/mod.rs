@@ -80,13 +80,14 @@ impl RadianceProbesOnGpu {
     pub fn new(gpu: Arc<Gpu>, world: &World, lighting: &Lighting, params: &RadianceProbeParams, piece: u64) -> Result<Self> {
         let transport = &lighting.transport;
         // The operator first: where it does not fit, nothing else need be made.
-        let operator = GpuOperator::new(&gpu, transport, lighting.reflectance(), piece)?;
+        let operator = GpuOperator::new(&gpu, transport, piece)?;
+        operator.set_reflectance(&gpu, &lighting.reflectances(world))?;
         let map = FrameMap::new(&world.scene.geometry, transport);
         let baseline = Baseline::new(gpu.clone(), world, Some(&map.dark), params.supersample)?;
         let scene = &*baseline.scene;
         let words: Vec<u32> = transport.receivers.iter().flat_map(words_of).collect();
         Ok(Self {
-            receiver_light: Kernel::in_scene(scene, &RECEIVER_LIGHT, &[])?,
+            receiver_light: Kernel::in_scene(scene, &RECEIVER_LIGHT, &[("IRRADIANCE", 1.0)])?,
             receivers: gpu.upload("receivers", cast_slice(&words))?,
             count: transport.receivers.len() as u32,
             operator,
@@ -115,6 +116,18 @@ impl RadianceProbesOnGpu {
     /// How many pieces the operator lies in.
     pub fn pieces(&self) -> usize {
         self.operator.pieces()
+    }
+
+    /// Takes the lights and colours of a frame's world. An error where it adds shapes.
+    pub fn relight(&mut self, world: &World, lighting: &Lighting) -> Result<()> {
+        let scene = self.baseline.scene.at(world)?;
+        self.receiver_light.rebind(&scene);
+        self.direct.rebind(&scene);
+        if lighting.changes() {
+            self.operator.set_reflectance(&scene.gpu, &lighting.reflectances(world))?;
+        }
+        self.baseline.rebind(scene);
+        Ok(())
     }
 
     /// A frame; its light's passes are those of Table 2.

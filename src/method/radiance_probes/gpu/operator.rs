@@ -132,8 +132,8 @@ pub(super) struct GpuOperator {
 }
 
 impl GpuOperator {
-    /// Uploads an operator of irradiance in pieces of so many bytes at the most, and what its receivers reflect.
-    pub(super) fn new(gpu: &Gpu, transport: &Transport, reflectance: &[Rgb], piece: u64) -> Result<Self> {
+    /// Uploads an operator of irradiance in pieces of so many bytes at the most.
+    pub(super) fn new(gpu: &Gpu, transport: &Transport, piece: u64) -> Result<Self> {
         let (receivers, probes) = (transport.receivers.len(), transport.probes.len());
         let (rays, terms) = (transport.rays.directions.len() as u32, transport.params.terms() as u32);
         for (what, count, most) in [("receivers", receivers, 64 * MOST_GROUPS), ("probes", probes, MOST_GROUPS)] {
@@ -145,7 +145,6 @@ impl GpuOperator {
         let space: usize = transport.clusters.iter().map(|c| c.rank).sum();
         let mut first_space = 0;
         let mut upload = |range| Part::new(gpu, transport, range, &mut first_space);
-        let reflectance: Vec<[f32; 4]> = reflectance.iter().map(|r| r.extend(0.0).to_array()).collect();
         let specs = [&RECEIVER_RADIANCE, &PROBE_RELIGHT, &CLUSTER_PROJECTION, &RECONSTRUCT];
         let [a, b, c, d] = specs.map(|spec| Kernel::new(gpu, spec));
         Ok(Self {
@@ -166,8 +165,14 @@ impl GpuOperator {
             lambda: colors("light of radiance probes", probes * terms as usize)?,
             spaces: colors("light of clusters", space)?,
             radiance: colors("radiance of receivers", receivers)?,
-            reflectance: gpu.upload("reflectance of receivers", cast_slice(&reflectance))?,
+            reflectance: colors("reflectance of receivers", receivers)?,
         })
+    }
+
+    /// Says what the receivers send on from now.
+    pub(super) fn set_reflectance(&self, gpu: &Gpu, reflectance: &[Rgb]) -> Result<()> {
+        let colors: Vec<[f32; 4]> = reflectance.iter().map(|r| r.extend(0.0).to_array()).collect();
+        gpu.checked(|| gpu.queue.write_buffer(&self.reflectance, 0, cast_slice(&colors)))
     }
 
     /// Makes the indirect light of all receivers from their direct light, by so many bounces.
