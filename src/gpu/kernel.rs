@@ -43,6 +43,11 @@ impl Kernel {
         Self::compile(&scene.gpu, spec, Some(scene), constants)
     }
 
+    /// Puts another scene of the same layout in the place of its own.
+    pub(crate) fn rebind(&mut self, scene: &GpuScene) {
+        self.scene = Some(scene.group.clone());
+    }
+
     fn compile(gpu: &Gpu, spec: &'static KernelSpec, scene: Option<&GpuScene>, constants: &[(&str, f64)]) -> Result<Self> {
         let source = assemble(spec.file)?;
         let mut constants = constants.to_vec();
@@ -106,8 +111,9 @@ fn unchecked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule
     // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there: an entry's place
     // is its list's first row, which `SceneParams` holds, plus its number times the rows of a record, and a member lies within its record
     // by the constants of scene.wgsl, which the contract's test compares with the Rust types. Numbers of triangles at which paths start come
-    // from hits of the same scene, and those of probes' texels were tested when the probe was read. Samples that a pixel keeps are numbered
-    // below their most. Pixels, texels and table entries that are computed from coordinates are wrapped or clamped to their image or table,
+    // from hits of the same scene, and those of probes' texels and of receivers were tested when the file was read. Samples that a pixel
+    // keeps are numbered below their most. Pixels, texels and table entries that are computed from coordinates are wrapped or clamped to
+    // their image or table,
     // after the coordinates were tested for numbers; where that lies in `words` `GpuScene` has said. The traversal's stack is no deeper than
     // `STACK`, which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the root down or up, or end with a path's
     // depth, which the roulette bounds or its limit. tests/gpu runs the same kernels both ways.

@@ -7,9 +7,10 @@ use super::seam;
 use super::texels::Point;
 use super::visible::Sight;
 use crate::base::math::{Rgb, hash_words};
+use crate::base::ray::Hit;
 use crate::material::Surface;
 use crate::scene::Geometry;
-use crate::transport::Sampler;
+use crate::transport::{Sampler, World};
 use glam::Vec2;
 use rayon::prelude::*;
 
@@ -28,6 +29,14 @@ pub struct Receiver {
     pub back: bool,
     /// Points of it; where fewer are in the open, some of them more than once.
     pub points: [Point; POINTS],
+}
+
+impl Receiver {
+    /// The surface at one of its points; `world` is the scene's, or a frame's.
+    pub fn surface(&self, world: &World, point: usize) -> Surface {
+        let p = self.points[point % POINTS];
+        world.surface(&Hit { t: 0.0, triangle: p.triangle, u: p.barycentric.x, v: p.barycentric.y })
+    }
 }
 
 impl Plan<'_> {

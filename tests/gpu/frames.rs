@@ -27,6 +27,22 @@ const SCENE: &str = r#"<scene version="3.0.0">
 const PATH: &str = r#"{"fov": 70, "size": [96, 54], "frames": [
     {"origin": [0, 0, 1.5], "target": [0, -0.5, 0]}, {"origin": [0.2, 0.1, 1.4], "target": [-0.3, -0.5, 0]}]}"#;
 
+/// What changes between its frames: lights and a colour, lights alone in the dark, and a shape.
+const LIGHTS: [(&str, &str); 3] = [
+    (
+        "lights.json",
+        r#"{"fps": 10, "materials": [{"id": "wall", "keyframes": [{"time": 0, "albedo": [0.8, 0.2, 0.1]}, {"time": 0.1, "albedo": [0.1, 0.2, 0.9]}]}],
+        "lights": [{"type": "directional", "direction": [0.2, -1, -0.4], "irradiance": [2, 2, 2]}]}"#,
+    ),
+    (
+        "dark.json",
+        r#"{"fps": 10, "scene_lights": false, "lights": [
+        {"type": "point", "intensity": [3, 2, 1], "keyframes": [{"time": 0, "position": [-1, 0, 0.5]}, {"time": 0.1, "position": [1, 0.3, 0.2]}]},
+        {"type": "spot", "position": [0, 1, 1], "target": [0, -1, 0], "intensity": [4, 5, 6]}]}"#,
+    ),
+    ("objects.json", r#"{"objects": [{"type": "sphere", "radius": 0.2, "position": [0, 0, 0]}]}"#),
+];
+
 /// A folder with baked probes of both kinds, a light map and curvatures.
 pub struct Baked(tempfile::TempDir);
 
@@ -35,11 +51,18 @@ impl Baked {
         let baked = Self(tempfile::tempdir().unwrap());
         std::fs::write(baked.at("scene.xml"), SCENE).unwrap();
         std::fs::write(baked.at("path.json"), PATH).unwrap();
+        for (name, text) in LIGHTS {
+            std::fs::write(baked.at(name), text).unwrap();
+        }
         let run = "run scene.xml --path path.json -o out --preset draft --probes 18 --probe-size 128x64 --spp 4 --all-texels \
             --lightmap-spp 4 --texel 0.1 --no-reference --quiet";
         let output = baked.reprobe(run);
         assert!(output.status.success(), "{}", text(&output.stderr));
         let bake = "bake-lightfield scene.xml --probes out/probes.json -o out/lightfield --size 32 --spp 2 --bounces 2 --quiet";
+        let output = baked.reprobe(bake);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let bake =
+            "bake-transport scene.xml --probes out/probes.json -o out/transport --texel 0.2 --rays 32 --relight-rays 400 --quiet";
         let output = baked.reprobe(bake);
         assert!(output.status.success(), "{}", text(&output.stderr));
         baked
@@ -58,6 +81,7 @@ impl Baked {
         let choice = device.map_or("cpu", |d| d.name.as_str());
         let inputs = match options.split_whitespace().nth(1).filter(|_| options.starts_with("--method")) {
             Some("light-field-probes") => "--probes out/lightfield",
+            Some("radiance-probes") => "--probes out/transport",
             Some("ulr") => "--probes out/probes --lightmap out/lightmap.exr",
             Some(_) => "--lightmap out/lightmap.exr",
             None => "--probes out/probes --lightmap out/lightmap.exr --curvature out/curvature.exr",

@@ -11,6 +11,7 @@ mod filter;
 mod frames;
 mod light_field;
 mod paths;
+mod radiance_probes;
 mod rays;
 mod ulr;
 
@@ -90,6 +91,8 @@ const TWICE: &[Test] = tests![
     paths::every_model_and_emitter_is_the_cpus,
     paths::a_sky_and_its_sun_are_the_cpus,
     paths::layers_and_full_images_are_the_cpus,
+    radiance_probes::commands_render_them,
+    radiance_probes::every_pass_is_the_cpus,
     rays::a_probe_sees_the_same_through_either,
     rays::a_scene_without_surfaces_has_no_hits,
     rays::closest_hits_are_the_cpus,

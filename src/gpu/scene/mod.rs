@@ -23,6 +23,9 @@ use textures::Textures;
 /// No texture, table or entry.
 pub(crate) const NONE: u32 = u32::MAX;
 
+/// Words that frames may have more than the scene: a directional light each, of which an animation adds a thousand at most.
+const ROOM: usize = 1024;
+
 /// Depth of the shader's stack. A node leaves at most one entry.
 pub(crate) const STACK: usize = 32;
 
@@ -125,33 +128,14 @@ pub struct GpuScene {
 impl GpuScene {
     /// Uploads what `world` is made of.
     pub fn new(gpu: Arc<Gpu>, world: &World) -> Result<Self> {
-        if let Some(material) = world.scene.materials.iter().find(|m| tilts(&m.bsdf) > 1) {
-            return Err(Error::Request(format!(
-                "material \"{}\": the GPU has no bump or normal map within another; use --device cpu",
-                material.name
-            )));
-        }
-        if !world.scene.geometry.rounds.is_empty() {
-            return Err(Error::Request(format!(
-                "{} spheres, cylinders and disks are too many for fine meshes, and the GPU has no round shapes; use --device cpu",
-                world.scene.geometry.rounds.len()
-            )));
-        }
-        if world.added.is_some() || world.relit {
-            let message = "the GPU has no shapes and no area lights beside those of the scene file; use --device cpu";
-            return Err(Error::Request(message.into()));
-        }
-        let is_pattern = |e: &Emitter| matches!(e, Emitter::Projector { .. } | Emitter::Spot { pattern: Some(_), .. });
-        if world.scene.emitters.iter().any(is_pattern) {
-            let message = "the GPU has no projector and no spot with a texture; use --device cpu";
-            return Err(Error::Request(message.into()));
-        }
+        check(world)?;
         let (tree, corners) = tree(world)?;
         let facets: Vec<[u32; 28]> = world.facets.iter().map(words_of).collect();
         let (mut records, mut words) = (Records::default(), Words::default());
         let params = SceneParams { corners, ..params(world, &mut records, &mut words)? };
         let tree = gpu.upload("the scene's tree", cast_slice(&tree))?;
         let facets = gpu.upload("the scene's surfaces", cast_slice(&facets))?;
+        words.extend([0; ROOM]);
         let unlit_words = words.0.len() as u64;
         let words = gpu.upload("the scene's textures", cast_slice(&words.0))?;
         let records = gpu.upload("the scene's materials and emitters", cast_slice(&records.0))?;
@@ -194,9 +178,35 @@ impl GpuScene {
         Ok(Self { words, params, group, ..self.clone() })
     }
 
+    /// Of a scene with a light map: the same triangles with the materials and emitters of a frame's world, and the light map as it is. The
+    /// scene itself is no longer of use: both share what lies before the light map, which is written anew.
+    ///
+    /// # Errors
+    /// The frame adds shapes, or makes some emit that do not in the scene.
+    pub(crate) fn at(&self, world: &World) -> Result<Self> {
+        check(world)?;
+        let gpu = &self.gpu;
+        let (mut records, mut words) = (Records::default(), Words::default());
+        let fresh = params(world, &mut records, &mut words)?;
+        if words.0.len() as u64 > self.unlit_words {
+            return Err(Error::Request("--lights: a frame's textures are more than the scene's; use --device cpu".into()));
+        }
+        let SceneParams { corners, light_width, light_height, light_front, light_back, light_corners, .. } = self.params;
+        let params = SceneParams { corners, light_width, light_height, light_front, light_back, light_corners, ..fresh };
+        gpu.checked(|| gpu.queue.write_buffer(&self.words, 0, cast_slice(&words.0)))?;
+        let records = gpu.upload("the scene's materials and emitters", cast_slice(&records.0))?;
+        let group = group(gpu, &self.layout, params, [&self.tree, &self.facets, &self.words, &records])?;
+        Ok(Self { records, params, group, ..self.clone() })
+    }
+
     /// What it takes on the device, bytes.
     pub(crate) fn bytes(&self) -> u64 {
         [&self.tree, &self.facets, &self.words, &self.records].map(wgpu::Buffer::size).iter().sum()
+    }
+
+    /// The buffer that the light map lies in, and the word where it begins: three floats a texel, all of the front and then of the back.
+    pub(crate) fn light_words(&self) -> (&wgpu::Buffer, u32) {
+        (&self.words, self.params.light_front)
     }
 
     /// Whether there is a light map to look diffuse light up in.
@@ -208,6 +218,32 @@ impl GpuScene {
     pub fn device(&self) -> &str {
         &self.gpu.adapter.name
     }
+}
+
+/// An error where a world has what no kernel knows.
+fn check(world: &World) -> Result<()> {
+    if let Some(material) = world.scene.materials.iter().find(|m| tilts(&m.bsdf) > 1) {
+        return Err(Error::Request(format!(
+            "material \"{}\": the GPU has no bump or normal map within another; use --device cpu",
+            material.name
+        )));
+    }
+    if !world.scene.geometry.rounds.is_empty() {
+        return Err(Error::Request(format!(
+            "{} spheres, cylinders and disks are too many for fine meshes, and the GPU has no round shapes; use --device cpu",
+            world.scene.geometry.rounds.len()
+        )));
+    }
+    if world.added.is_some() || world.relit {
+        let message = "the GPU has no shapes and no area lights beside those of the scene file; use --device cpu";
+        return Err(Error::Request(message.into()));
+    }
+    let is_pattern = |e: &Emitter| matches!(e, Emitter::Projector { .. } | Emitter::Spot { pattern: Some(_), .. });
+    if world.scene.emitters.iter().any(is_pattern) {
+        let message = "the GPU has no projector and no spot with a texture; use --device cpu";
+        return Err(Error::Request(message.into()));
+    }
+    Ok(())
 }
 
 fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, params: SceneParams, buffers: [&wgpu::Buffer; 4]) -> Result<wgpu::BindGroup> {

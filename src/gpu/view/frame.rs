@@ -55,6 +55,12 @@ impl Baseline {
         })
     }
 
+    /// Takes another scene of the same triangles.
+    pub(crate) fn rebind(&mut self, scene: GpuScene) {
+        self.gbuffer.rebind(&scene);
+        self.scene = Arc::new(scene);
+    }
+
     /// Renders a frame whose glossy layer `fill` puts into its target, with the camera at the view's size; it may put a diffuse layer in
     /// place of the view's. The view has its glossy albedos where `wants_albedo`.
     pub(crate) fn frame(

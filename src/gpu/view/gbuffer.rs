@@ -89,6 +89,12 @@ impl GBuffer {
         })
     }
 
+    /// Looks at another scene of the same triangles.
+    pub(crate) fn rebind(&mut self, scene: &GpuScene) {
+        self.gbuffer.rebind(scene);
+        self.view_factors.rebind(scene);
+    }
+
     /// Bytes of the curvatures.
     pub(crate) fn bytes(&self) -> u64 {
         self.curved_vertices.size() + self.curvatures.size()

@@ -1,6 +1,7 @@
 //! A view on the device, a record a pixel: the twin of [`crate::view::gbuffer::GBuffer`] and of [`Reflected`].
 
 pub(crate) mod composite;
+pub(crate) mod direct;
 pub mod frame;
 pub(crate) mod gbuffer;
 pub(crate) mod mirror;

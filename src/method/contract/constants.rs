@@ -4,12 +4,14 @@ use crate::base::math;
 use crate::gpu::scene;
 use crate::gpu::scene::materials::Kind;
 use crate::gpu::scene::{lights, materials, textures};
+use crate::lightmap::{fill, receivers};
 use crate::material::bsdf::{Distribution, Lobes, albedo, microfacet, principled, roughplastic};
 use crate::material::surface;
 use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gpu_gather};
 use crate::method::glossy_probes::{coverage, filter, footprint, perturb, previous, search};
 use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
 use crate::method::path_trace::denoise;
+use crate::method::radiance_probes::{gpu as gpu_radiance_probes, seen};
 use crate::method::{image_space_gather, ulr};
 use crate::probe::{neighbors, parameter_map as qhmap};
 use crate::transport::{bvh, light_tree, path, sampler};
@@ -129,6 +131,13 @@ fn twins(file: &str) -> Twins {
         },
         "path_trace/add_guides.wgsl" => twins! { ENVIRONMENT_DEPTH = denoise::FAR; },
         "path_trace/denoise.wgsl" => twins! { MIN_ALBEDO = denoise::MIN_ALBEDO; },
+        "radiance_probes/fill_ring.wgsl" => twins! { CORNER = fill::CORNER; },
+        "radiance_probes/probe_relight.wgsl" => twins! { NO_RECEIVER = seen::NO_RECEIVER; },
+        "radiance_probes/receiver_light.wgsl" => twins! {
+            POINTS = receivers::POINTS;
+            RECEIVER_WORDS = gpu_radiance_probes::RECEIVER_WORDS;
+            BACK_BIT = gpu_radiance_probes::BACK_BIT;
+        },
         "shared/albedo.wgsl" => twins! {
             ALBEDO_COSINES = albedo::COSINES;
             ALBEDO_ALPHAS = albedo::ALPHAS;

@@ -1,13 +1,14 @@
 //! All kernels.
 
 use crate::gpu::spec::KernelSpec;
-use crate::gpu::view::{composite, gbuffer, mirror, mirror_light};
+use crate::gpu::view::{composite, direct, gbuffer, mirror, mirror_light};
 use crate::gpu::{follow, rays};
 use crate::method::glossy_probes::gpu::{coverage, fill, filter, footprint, gather};
 use crate::method::image_space_gather::gpu as image_space_gather;
 use crate::method::light_field_probes::gpu as light_field_probes;
 use crate::method::lightmap_rt::gpu as lightmap_rt;
 use crate::method::path_trace::{denoise_gpu as denoise, gpu as path_trace};
+use crate::method::radiance_probes::gpu::{self as radiance_probes, light_map, operator};
 use crate::method::ulr::gpu as ulr;
 
 /// The records of all kernels. A file of shaders/ that none of them needs fails the test.
@@ -21,6 +22,7 @@ pub(crate) const KERNELS: &[&KernelSpec] = &[
     &denoise::DESPECKLE,
     &denoise::SMOOTH_LEVEL,
     &denoise::WITH_VARIANCE,
+    &direct::DIRECT_LIGHT,
     &filter::FILTER_END,
     &filter::FILTER_PASS,
     &filter::FILTER_START,
@@ -38,10 +40,17 @@ pub(crate) const KERNELS: &[&KernelSpec] = &[
     &light_field_probes::TRACE_RAYS,
     &lightmap_rt::MEAN_LIGHT,
     &lightmap_rt::VIEW_STARTS,
+    &light_map::FILL_RING,
+    &light_map::MAP_LIGHT,
     &mirror::MIRROR_PASS,
     &mirror_light::MIRROR_LIGHT,
+    &operator::CLUSTER_PROJECTION,
+    &operator::PROBE_RELIGHT,
+    &operator::RECEIVER_RADIANCE,
+    &operator::RECONSTRUCT,
     &path_trace::ADD_SAMPLES,
     &path_trace::CAMERA_HITS,
+    &radiance_probes::RECEIVER_LIGHT,
     &rays::CLOSEST,
     &ulr::ULR_BLEND,
     &ulr::ULR_LOOK,

@@ -59,14 +59,7 @@ struct Rows {
     matrix: DMatrix<f32>,
 }
 
-/// Mean square of rows that are not zero: what errors are measured by.
-pub fn mean_square(rows: &[Row]) -> f64 {
-    let square = |row: &Row| row.values.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
-    let squares: Vec<f64> = rows.iter().map(square).filter(|&s| s > 0.0).collect();
-    squares.iter().sum::<f64>() / squares.len().max(1) as f64
-}
-
-/// Compresses the rows of a group of receivers, in as many clusters as that takes. `scale`: the [`mean_square`] of all receivers' rows.
+/// Compresses the rows of a group of receivers, in as many clusters as that takes. `scale`: the mean square of all receivers' rows.
 pub fn compress(group: Vec<u32>, rows: Vec<Row>, gather: &Gather, (params, scale): (&CompressParams, f64)) -> Vec<Cluster> {
     let (mut done, mut open) = (Vec::new(), vec![(group, rows)]);
     while let Some((group, rows)) = open.pop() {
@@ -198,7 +191,7 @@ fn orthonormal(mut columns: DMatrix<f32>) -> DMatrix<f32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::transport::{Interpolation, Kept};
+    use super::super::transport::{Interpolation, Kept, mean_square};
     use super::*;
 
     /// Rows that are sums of `rank` patterns over 3 probes of order 1, with noise.

@@ -1,6 +1,6 @@
 //! A picture of what is lost on the way to the probes and back (§5.2, bottom row of Fig. 10): over the atlas, and in a camera's view.
 
-use super::light::as_signed_map;
+use super::frame_map::FrameMap;
 use super::operator::Transport;
 use crate::base::math::Rgb;
 use crate::io::canvas::{BACKGROUND, Canvas, Colour, INK, LETTER, LINE};
@@ -29,7 +29,7 @@ pub fn draw(world: &World, transport: &Transport, norms: &[(u32, f32)], camera: 
     for value in &mut values {
         if value.is_nan() { *value = last } else { last = *value }
     }
-    let map = as_signed_map(transport, world, &values.iter().map(|&v| Rgb::splat(v)).collect::<Vec<_>>());
+    let map = FrameMap::new(&world.scene.geometry, transport).filled(values.iter().map(|&v| Rgb::splat(v)));
     let (atlas, view) = (atlas(transport, &values), view(world, &map, camera));
     let top = atlas.size[1].max(8 * LINE) + 2 * GAP;
     let mut canvas = Canvas::new([WIDTH, top + view.size[1]], BACKGROUND);

@@ -6,12 +6,9 @@ use super::params::RadianceProbeParams;
 use super::transport::{Kept, first_four};
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
-use crate::base::ray::Hit;
 use crate::lightmap::LightMap;
-use crate::lightmap::fill::dilate;
 use crate::lightmap::lookup::sides;
 use crate::lightmap::receivers::{POINTS, Receiver, spread};
-use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
 use crate::transport::path::{PathParams, transmitted_irradiance};
 use crate::transport::{Sampler, World};
@@ -28,19 +25,13 @@ pub struct Light {
     pub indirect: Vec<Rgb>,
 }
 
-/// The surface at a point of a receiver.
-pub fn surface(world: &World, receiver: &Receiver, point: usize) -> Surface {
-    let p = receiver.points[point % POINTS];
-    world.surface(&Hit { t: 0.0, triangle: p.triangle, u: p.barycentric.x, v: p.barycentric.y })
-}
-
 /// E_T that emitters send to each receiver. The random numbers of a receiver are the same in every frame, so that light which stays where it
 /// is does not flicker.
 pub fn direct(world: &World, receivers: &[Receiver], samples: u32, seed: u32) -> Vec<Rgb> {
     let of = |r: &Receiver| {
         let stream = hash_words(&[seed, r.pixel, u32::from(r.back)]);
         let sample = |i: u32| {
-            let at = surface(world, r, i as usize);
+            let at = r.surface(world, i as usize);
             transmitted_irradiance(world, &at, r.back, None, &PathParams::DIRECT, &mut Sampler::new(stream, i))
         };
         (0..samples).map(sample).sum::<Rgb>() / samples as f32
@@ -52,7 +43,7 @@ pub fn direct(world: &World, receivers: &[Receiver], samples: u32, seed: u32) ->
 fn reflectance(world: &World, r: &Receiver) -> Rgb {
     let side = if r.back { -1.0 } else { 1.0 };
     let out = |k: usize| {
-        let at = surface(world, r, k);
+        let at = r.surface(world, k);
         let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / POINTS as f32, (0.618 * k as f32 + 0.3).fract()));
         let bsdf = &world.scene.materials[at.material as usize].bsdf;
         bsdf.diffuse_out(&at, Vec3::new(d.x, d.y, d.z * side))
@@ -79,10 +70,27 @@ impl Lighting {
         let material = |r: &Receiver| world.scene.geometry.object(r.points[0].triangle).material;
         let changes = |r: &u32| changed.binary_search(&material(&transport.receivers[*r as usize])).is_ok();
         let changing = (0..transport.receivers.len() as u32).filter(changes).collect();
-        let normal = |r: &Receiver| surface(world, r, 0).frame.n * if r.back { -1.0 } else { 1.0 };
+        let normal = |r: &Receiver| r.surface(world, 0).frame.n * if r.back { -1.0 } else { 1.0 };
         let keeps_sh1 = transport.params.receiver == Kept::Sh1;
         let normals = transport.receivers.iter().filter(|_| keeps_sh1).map(normal).collect();
         Self { transport, reflectance, changing, normals }
+    }
+
+    /// What of E_T each receiver sends on as diffuse radiance in a frame, whose world this is.
+    pub fn reflectances(&self, world: &World) -> Cow<'_, [Rgb]> {
+        let mut all = Cow::Borrowed(self.reflectance.as_slice());
+        if !self.changing.is_empty() {
+            let of = |&r: &u32| reflectance(world, &self.transport.receivers[r as usize]);
+            let changed: Vec<Rgb> = self.changing.par_iter().with_min_len(64).map(of).collect();
+            let all = all.to_mut();
+            self.changing.iter().zip(changed).for_each(|(&r, value)| all[r as usize] = value);
+        }
+        all
+    }
+
+    /// Whether frames differ in what receivers send on.
+    pub fn changes(&self) -> bool {
+        !self.changing.is_empty()
     }
 
     /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2). `before`: indirect light that bounces go on
@@ -95,13 +103,7 @@ impl Lighting {
         clock: &mut Clock,
     ) -> Light {
         let transport = &self.transport;
-        let mut reflectances = Cow::Borrowed(&self.reflectance);
-        if !self.changing.is_empty() {
-            let of = |&r: &u32| reflectance(world, &transport.receivers[r as usize]);
-            let changed: Vec<Rgb> = self.changing.par_iter().with_min_len(64).map(of).collect();
-            let all = reflectances.to_mut();
-            self.changing.iter().zip(changed).for_each(|(&r, value)| all[r as usize] = value);
-        }
+        let reflectances = self.reflectances(world);
         let direct = direct(world, &transport.receivers, params.map_samples, seed);
         clock.lap("scene relight");
         let hits = transport.hits_in(world);
@@ -111,7 +113,9 @@ impl Lighting {
             let radiance = radiance(&direct, &self.irradiance(&indirect), &reflectances);
             let lambda = transport.probe_radiance(&hits, &radiance);
             clock.lap("probe relight");
-            indirect = transport.receive(&lambda);
+            let spaces = transport.project(&lambda);
+            clock.lap("cluster projection");
+            indirect = transport.reconstruct(&spaces);
             clock.lap("receivers");
         }
         Light { direct, indirect }
@@ -143,29 +147,20 @@ fn radiance(direct: &[Rgb], indirect: &[Rgb], reflectance: &[Rgb]) -> Vec<Rgb> {
     direct.par_iter().zip(indirect).zip(reflectance).map(|((d, i), &r)| (*d + i.max(Rgb::ZERO)) * r).collect()
 }
 
-/// A light map of one number a receiver.
+/// A light map of irradiance at receivers, its seams closed, as files have it.
 pub fn as_light_map(transport: &Transport, world: &World, values: &[Rgb]) -> LightMap {
-    map(transport, world, values, &|image, valid| spread(&world.scene.geometry, &transport.atlas, image, valid))
-}
-
-/// The same of numbers that may be negative; the seams of charts stay as they are.
-pub fn as_signed_map(transport: &Transport, world: &World, values: &[Rgb]) -> LightMap {
-    map(transport, world, values, &|image, valid| dilate(&transport.atlas, image, valid))
-}
-
-fn map(transport: &Transport, world: &World, values: &[Rgb], fill: &dyn Fn(&mut [Rgb], &[bool])) -> LightMap {
-    let pixels = (transport.atlas.size[0] * transport.atlas.size[1]) as usize;
+    let (geometry, pixels) = (&world.scene.geometry, (transport.atlas.size[0] * transport.atlas.size[1]) as usize);
     let side = |back: bool| {
         let (mut image, mut valid) = (vec![Rgb::ZERO; pixels], vec![false; pixels]);
         for (r, value) in transport.receivers.iter().zip(values).filter(|(r, _)| r.back == back) {
-            (image[r.pixel as usize], valid[r.pixel as usize]) = (*value, true);
+            (image[r.pixel as usize], valid[r.pixel as usize]) = (value.max(Rgb::ZERO), true);
         }
         let any = valid.contains(&true);
         if any {
-            fill(&mut image, &valid);
+            spread(geometry, &transport.atlas, &mut image, &valid);
         }
         any.then_some(image)
     };
     let front = side(false).unwrap_or_else(|| vec![Rgb::ZERO; pixels]);
-    sides(&world.scene.geometry, &transport.atlas, front, side(true))
+    sides(geometry, &transport.atlas, front, side(true))
 }

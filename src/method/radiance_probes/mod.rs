@@ -9,6 +9,8 @@
 pub mod bake;
 pub mod cluster;
 pub mod compress;
+pub mod frame_map;
+pub mod gpu;
 pub mod harmonics;
 pub mod inspect;
 pub mod light;

@@ -1,7 +1,6 @@
 //! The operator in memory, and what it makes of the probes' radiance: cluster projection and receiver reconstruction (§4.2).
 
 use super::compress::Cluster;
-use super::light::surface;
 use super::params::TransportParams;
 use super::relight::RelightRays;
 use super::seen::NO_RECEIVER;
@@ -52,7 +51,7 @@ impl Transport {
         let rays = self.rays.directions.len();
         let unblocked = |(i, &hit): (usize, &u32)| {
             let receiver = self.receivers.get(hit as usize)?;
-            let (p, to) = (self.probes[i / rays], surface(world, receiver, 0).p);
+            let (p, to) = (self.probes[i / rays], receiver.surface(world, 0).p);
             let ray = Ray { t_max: p.distance(to), ..Ray::new(p, (to - p).try_normalize()?) };
             (!world.occluded_by_added(&ray)).then_some(hit)
         };
@@ -62,9 +61,20 @@ impl Transport {
 
     /// What the receivers get by way of the probes: `receiver.rows()` numbers each (Eq. 6).
     pub fn receive(&self, lambda: &[Rgb]) -> Vec<Rgb> {
-        let rows = self.params.receiver.rows();
+        self.reconstruct(&self.project(lambda))
+    }
+
+    /// Cluster projection: the light of each cluster's own few dimensions.
+    pub fn project(&self, lambda: &[Rgb]) -> Vec<Vec<Rgb>> {
         let terms = self.params.terms();
-        let all: Vec<Vec<Rgb>> = self.clusters.par_iter().map(|cluster| cluster.receive(lambda, terms)).collect();
+        self.clusters.par_iter().map(|cluster| cluster.project(lambda, terms)).collect()
+    }
+
+    /// Receiver reconstruction, from what [`Self::project`] gave: `receiver.rows()` numbers each.
+    pub fn reconstruct(&self, spaces: &[Vec<Rgb>]) -> Vec<Rgb> {
+        let rows = self.params.receiver.rows();
+        let clusters = self.clusters.par_iter().zip(spaces);
+        let all: Vec<Vec<Rgb>> = clusters.map(|(cluster, space)| cluster.reconstruct(space, rows)).collect();
         let mut light = vec![Rgb::ZERO; self.receivers.len() * rows];
         for (cluster, values) in self.clusters.iter().zip(&all) {
             for (&r, values) in cluster.receivers.iter().zip(values.chunks_exact(rows)) {
@@ -83,27 +93,28 @@ impl Transport {
 }
 
 impl Cluster {
-    /// Light of the cluster's receivers (as many numbers each as they keep) under `lambda` of all probes.
-    pub fn receive(&self, lambda: &[Rgb], terms: usize) -> Vec<Rgb> {
-        let numbers = self.reconstruction.len().checked_div(self.rank);
-        let Some(numbers) = numbers else { return vec![Rgb::ZERO; self.receivers.len() * 4] };
+    /// Σ Vᵀ λ, under `lambda` of all probes.
+    fn project(&self, lambda: &[Rgb], terms: usize) -> Vec<Rgb> {
         // A channel after the other, so that sums run along them.
         let mine = || self.probes.iter().flat_map(|&p| &lambda[p as usize * terms..][..terms]);
         let channels: [Vec<f32>; 3] = std::array::from_fn(|c| mine().map(|l| l[c]).collect());
         let width = channels[0].len();
         let mut row = vec![0.0; width];
-        let mut space = vec![Rgb::ZERO; self.rank];
-        for (k, light) in space.iter_mut().enumerate() {
+        let number = |k: usize| {
             self.projection[k * width..][..width].convert_to_f32_slice(&mut row);
-            *light = Rgb::from_array([0, 1, 2].map(|c| dot(&row, &channels[c])));
-        }
+            Rgb::from_array([0, 1, 2].map(|c| dot(&row, &channels[c])))
+        };
+        (0..self.rank).map(number).collect()
+    }
+
+    /// U times the light of the cluster's space: `rows` numbers a receiver.
+    fn reconstruct(&self, space: &[Rgb], rows: usize) -> Vec<Rgb> {
         let mut factors = vec![0.0; self.rank];
         let number = |i: usize| {
-            let factors: &mut [f32] = &mut factors;
-            self.reconstruction[i * self.rank..][..self.rank].convert_to_f32_slice(factors);
-            factors.iter().zip(&space).map(|(&u, &l)| l * u).sum()
+            self.reconstruction[i * self.rank..][..self.rank].convert_to_f32_slice(&mut factors);
+            factors.iter().zip(space).map(|(&u, &l)| l * u).sum()
         };
-        (0..numbers).map(number).collect()
+        (0..self.receivers.len() * rows).map(number).collect()
     }
 }
 

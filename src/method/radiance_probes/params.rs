@@ -83,7 +83,7 @@ pub struct RadianceProbeParams {
     /// Samples of direct light, a pixel of the G-buffer; 0 leaves it out.
     pub direct_samples: u32,
     /// Paths along the glossy lobes, a pixel of the G-buffer, lit by the receivers' light where they meet diffuse surfaces; with 0 the glossy
-    /// layer has direct light, and what receivers that keep sh1 say. *Ours*: the paper's frames have no other reflections.
+    /// layer is what receivers that keep sh1 say, and black with others. *Ours*: the paper's frames have no other reflections.
     pub gloss_samples: u32,
     /// Samples of direct light, a receiver.
     pub map_samples: u32,

@@ -35,6 +35,11 @@ impl RelightRays {
         Self { directions, weighted }
     }
 
+    /// The weighted harmonics, ray by ray.
+    pub fn by_ray(&self) -> Vec<f32> {
+        self.weighted.transpose().as_slice().to_vec()
+    }
+
     /// The receiver that each ray of each probe meets, probe by probe.
     pub fn hits(&self, ground: &Ground) -> Vec<u32> {
         let meets = |p: Vec3, d: Vec3| {

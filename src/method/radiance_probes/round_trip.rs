@@ -5,7 +5,6 @@
 //! functional is the largest error that light of unit length can make.
 
 use super::harmonics::{Harmonics, MAX_TERMS};
-use super::light::surface;
 use super::operator::Transport;
 use super::seen::NO_RECEIVER;
 use super::transport::{Gather, Kept};
@@ -43,7 +42,7 @@ fn norm(
     row: &[(u32, Vec<f32>)],
 ) -> f32 {
     let r = &transport.receivers[receiver as usize];
-    let x = surface(world, r, 0);
+    let x = r.surface(world, 0);
     let normal = facing(&x, r.back);
     let frame = Basis::from_normal(x.frame.n * if r.back { -1.0 } else { 1.0 });
     let bsdf = &world.scene.materials[x.material as usize].bsdf;
@@ -67,7 +66,7 @@ fn norm(
         for (d, hit) in transport.rays.directions.iter().zip(hits).step_by(step).filter(|(_, hit)| **hit != NO_RECEIVER) {
             probes.evaluate(*d, &mut y);
             let back: f32 = alpha.iter().zip(&y).map(|(a, y)| a * y).sum();
-            let seen = surface(world, &transport.receivers[*hit as usize], *hit as usize % POINTS).p;
+            let seen = transport.receivers[*hit as usize].surface(world, *hit as usize % POINTS).p;
             let Some(towards) = (seen - x.p).try_normalize() else { continue };
             if back == 0.0 || towards.dot(normal) <= 0.0 || world.occluded(&x.spawn_to(seen)) {
                 continue;
@@ -111,6 +110,6 @@ impl Transport {
 
     /// Where a receiver is, metres.
     pub fn place(&self, world: &World, receiver: u32) -> Vec3 {
-        surface(world, &self.receivers[receiver as usize], 0).p
+        self.receivers[receiver as usize].surface(world, 0).p
     }
 }

@@ -1,20 +1,25 @@
 //! Radiance probes in the table of methods.
 
-use super::light::{Light, Lighting, as_light_map};
+use super::frame_map::FrameMap;
+use super::gpu::RadianceProbesOnGpu;
+use super::light::{Light, Lighting};
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
 use super::shade::{Indirect, Shading};
-use crate::Result;
+use super::transport::Kept;
 use crate::base::clock::Clock;
 use crate::base::math::Rgb;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
+use crate::gpu::Gpu;
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
 use crate::scene::Animation;
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
+use crate::{Error, Result};
 use serde_json::Value;
+use std::sync::Arc;
 
 /// The row.
 pub const METHOD: Method = Method {
@@ -30,7 +35,7 @@ pub const METHOD: Method = Method {
     parameters,
     for_scene: as_given,
     cpu,
-    gpu: None,
+    gpu: Some(gpu),
 };
 
 fn parameters(options: &Options) -> Result<Value> {
@@ -42,16 +47,16 @@ fn parameters(options: &Options) -> Result<Value> {
 struct OnCpu<'a> {
     setup: Setup<'a>,
     lighting: Lighting,
+    map: FrameMap,
     params: RadianceProbeParams,
     /// The last frame that was lit, and its indirect light, where the next goes on from that.
     last: Option<(u32, Vec<Rgb>)>,
 }
 
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
-    let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
-    let lighting = Lighting::new(setup.world, transport, &changed);
-    Ok(Box::new(OnCpu { setup: *setup, lighting, params: setup.parameters()?, last: None }))
+    let lighting = lighting(setup)?;
+    let map = FrameMap::new(&setup.world.scene.geometry, &lighting.transport);
+    Ok(Box::new(OnCpu { setup: *setup, lighting, map, params: setup.parameters()?, last: None }))
 }
 
 impl OnCpu<'_> {
@@ -87,9 +92,8 @@ impl Renderer for OnCpu<'_> {
         }
         let world = of_frame.as_ref().unwrap_or(setup.world);
         let light = self.light(view, world, &mut clock);
-        let transport = &self.lighting.transport;
-        let indirect = Indirect::new(transport, world, &light);
-        let all = (self.params.gloss_samples > 0).then(|| as_light_map(transport, world, &self.lighting.total(&light)));
+        let indirect = Indirect::new(&self.map, self.lighting.transport.params.receiver, &light);
+        let all = (self.params.gloss_samples > 0).then(|| self.map.lit(&self.lighting.total(&light)));
         clock.lap("light map");
         let baseline = Baseline::new(world, None, self.params.supersample);
         let g = baseline.gbuffer(&view.camera, &mut clock);
@@ -112,5 +116,62 @@ impl Renderer for OnCpu<'_> {
 
     fn probe_bytes(&self) -> [u64; 2] {
         [self.lighting.transport.bytes() as u64, 0]
+    }
+}
+
+struct OnGpu<'a> {
+    setup: Setup<'a>,
+    /// Where lights or colours change.
+    lighting: Option<Lighting>,
+    probes: RadianceProbesOnGpu,
+}
+
+/// The lighting of a setup's frames.
+fn lighting(setup: &Setup) -> Result<Lighting> {
+    let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
+    let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
+    Ok(Lighting::new(setup.world, transport, &changed))
+}
+
+fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let lighting = lighting(setup)?;
+    if lighting.transport.params.receiver != Kept::Irradiance {
+        let message =
+            "the GPU's radiance probes have receivers of irradiance alone (bake-transport --receiver); use --device cpu";
+        return Err(Error::Request(message.into()));
+    }
+    let params: RadianceProbeParams = setup.parameters()?;
+    if params.gloss_samples > 0 || params.feedback {
+        let message = "the GPU's radiance probes have neither gloss_samples nor feedback; use --device cpu";
+        return Err(Error::Request(message.into()));
+    }
+    let piece = gpu.adapter.max_binding;
+    let mut probes = RadianceProbesOnGpu::new(gpu, setup.world, &lighting, &params, piece)?;
+    // What the GPU lacks shows in any frame.
+    if let Some(world) = setup.views.first().and_then(|view| setup.world_at(view)) {
+        probes.relight(&world, &lighting)?;
+    }
+    Ok(Box::new(OnGpu { setup: *setup, lighting: setup.animation.map(|_| lighting), probes }))
+}
+
+impl Renderer for OnGpu<'_> {
+    fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
+        let mut clock = Clock::start();
+        if let Some((world, lighting)) = self.setup.world_at(view).zip(self.lighting.as_ref()) {
+            self.probes.relight(&world, lighting)?;
+            clock.lap("world");
+        }
+        let frame = self.probes.frame(&view.camera, self.setup.seed, view.frame)?;
+        progress.advance(view.camera.size[1].into());
+        Ok(Frame::of(frame.layers, [clock.laps, frame.passes].concat()))
+    }
+
+    fn gpu(&self) -> Option<(&str, bool)> {
+        Some((self.probes.device(), self.probes.has_clock()))
+    }
+
+    fn probe_bytes(&self) -> [u64; 2] {
+        let host = self.lighting.as_ref().map_or(0, |lighting| lighting.transport.bytes());
+        [host as u64, self.probes.probe_bytes()]
     }
 }

@@ -71,8 +71,7 @@ impl Receivers {
 
     /// The surface at a point of a receiver.
     pub fn surface(&self, world: &World, receiver: u32, point: usize) -> Surface {
-        let p = self.list[receiver as usize].points[point];
-        world.surface(&crate::base::ray::Hit { t: 0.0, triangle: p.triangle, u: p.barycentric.x, v: p.barycentric.y })
+        self.list[receiver as usize].surface(world, point)
     }
 }
 

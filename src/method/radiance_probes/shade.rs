@@ -1,7 +1,7 @@
 //! The layers of a view that radiance probes light (§4.2, §5.1).
 
-use super::light::{Light, as_light_map, as_signed_map};
-use super::operator::Transport;
+use super::frame_map::FrameMap;
+use super::light::Light;
 use super::params::RadianceProbeParams;
 use super::transport::{Kept, first_four};
 use crate::base::math::{Basis, Rgb, hash_words, luminance};
@@ -20,8 +20,8 @@ use std::f32::consts::{FRAC_1_PI, PI};
 /// Directions by which light of first order is taken in.
 const DIRECTIONS: u32 = 16;
 
-/// Branches of a pixel's random stream: direct light of either layer, and paths along glossy lobes.
-const BRANCHES: [u32; 3] = [1, 2, 3];
+/// Branches of a pixel's random stream: direct light of the glossy layer, and paths along its lobes.
+const BRANCHES: [u32; 2] = [1, 2];
 
 /// Light that comes by way of the probes, where pixels look it up.
 pub enum Indirect {
@@ -32,13 +32,13 @@ pub enum Indirect {
 }
 
 impl Indirect {
-    /// Of a frame's light.
-    pub fn new(transport: &Transport, world: &World, light: &Light) -> Self {
-        match transport.params.receiver {
-            Kept::Irradiance => Self::Irradiance(as_light_map(transport, world, &light.indirect)),
+    /// Of a frame's light at receivers.
+    pub fn new(map: &FrameMap, kept: Kept, light: &Light) -> Self {
+        match kept {
+            Kept::Irradiance => Self::Irradiance(map.lit(&light.indirect)),
             Kept::Sh1 => {
-                let number = |k: usize| light.indirect.iter().skip(k).step_by(4).copied().collect::<Vec<Rgb>>();
-                Self::Radiance(Box::new([0, 1, 2, 3].map(|k| as_signed_map(transport, world, &number(k)))))
+                let number = |k: usize| light.indirect.iter().skip(k).step_by(4).copied();
+                Self::Radiance(Box::new([0, 1, 2, 3].map(|k| map.filled(number(k)))))
             }
         }
     }
@@ -66,7 +66,7 @@ impl Shading<'_> {
         let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
         self.layer(view, |p, stream| {
             let scene = &self.world.scene;
-            let straight = direct(self.world, p, query, self.params.direct_samples, hash_words(&[stream, BRANCHES[0]]));
+            let straight = direct(self.world, p, query, self.params.direct_samples, stream);
             straight
                 + match self.indirect {
                     Indirect::Irradiance(map) => map.diffuse_radiance(scene, &p.surface, p.wo),
@@ -75,22 +75,18 @@ impl Shading<'_> {
         })
     }
 
-    /// The glossy layer: paths along the lobes that read diffuse light from the receivers; without any, direct light, and where receivers keep
-    /// sh1 the linear terms of theirs as one distant light (§5.1, after Sloan 2008).
+    /// The glossy layer: paths along the lobes that read diffuse light from the receivers; without any, where receivers keep sh1, direct light
+    /// and the linear terms of theirs as one distant light (§5.1, after Sloan 2008); else none.
     pub fn glossy(&self, view: &GBuffer) -> Vec<Rgb> {
-        self.layer(view, |p, stream| {
-            if p.alpha.is_none() {
-                return Rgb::ZERO;
+        self.layer(view, |p, stream| match (self.total, self.indirect) {
+            _ if p.alpha.is_none() => Rgb::ZERO,
+            (Some(total), _) => self.along_lobes(p, total, hash_words(&[stream, BRANCHES[1]])),
+            (None, Indirect::Irradiance(_)) => Rgb::ZERO,
+            (None, Indirect::Radiance(maps)) => {
+                let count = self.params.direct_samples;
+                let straight = direct(self.world, p, GLOSSY, count, hash_words(&[stream, BRANCHES[0]]));
+                straight + self.reflected(p, &looked_up(maps, p))
             }
-            if let Some(total) = self.total {
-                return self.along_lobes(p, total, hash_words(&[stream, BRANCHES[2]]));
-            }
-            let straight = direct(self.world, p, GLOSSY, self.params.direct_samples, hash_words(&[stream, BRANCHES[1]]));
-            straight
-                + match self.indirect {
-                    Indirect::Irradiance(_) => Rgb::ZERO,
-                    Indirect::Radiance(maps) => self.reflected(p, &looked_up(maps, p)),
-                }
         })
     }
 

@@ -1,7 +1,7 @@
 //! Light by way of probes against what is known of it, and against path tracing.
 
 use super::bake::Bake;
-use super::light::{Lighting, direct, surface};
+use super::light::{Lighting, direct};
 use super::operator::Transport;
 use super::params::{RadianceProbeParams, TransportParams};
 use super::round_trip::{norms, sample};
@@ -80,7 +80,7 @@ fn traced(world: &World, transport: &Transport, receivers: &[u32], samples: u32)
         let (mut sum, mut squares) = (Rgb::ZERO, 0.0);
         for i in 0..samples {
             let mut sampler = Sampler::new(hash_words(&[r, 5]), i);
-            let at = surface(world, receiver, i as usize);
+            let at = receiver.surface(world, i as usize);
             let light = transmitted_irradiance(world, &at, receiver.back, None, &PathParams::default(), &mut sampler);
             sum += light;
             squares += light.y * light.y;

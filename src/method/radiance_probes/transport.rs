@@ -1,6 +1,5 @@
 //! Local transport: how a receiver's light follows from the radiance of the probes around it (§3.2, §3.3).
 
-use super::compress::mean_square;
 use super::harmonics::{Harmonics, MAX_TERMS};
 use super::seen::Ground;
 use crate::base::math::Basis;
@@ -248,6 +247,13 @@ impl Sums {
             .map(|(kind, slot, j)| value(kind, slot, j))
             .collect()
     }
+}
+
+/// Mean square of rows that are not zero: what errors are measured by.
+pub fn mean_square(rows: &[Row]) -> f64 {
+    let square = |row: &Row| row.values.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
+    let squares: Vec<f64> = rows.iter().map(square).filter(|&s| s > 0.0).collect();
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
 /// The harmonics up to order 1.

@@ -1,0 +1,178 @@
+//! Frames by radiance probes on a device: the twin of [`super::light`] and of what `render-path` makes of it.
+
+pub(crate) mod light_map;
+pub(crate) mod operator;
+
+use super::frame_map::FrameMap;
+use super::light::Lighting;
+use super::params::RadianceProbeParams;
+use crate::Result;
+use crate::base::math::Rgb;
+use crate::gpu::Gpu;
+use crate::gpu::commands::Commands;
+use crate::gpu::kernel::Kernel;
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
+use crate::gpu::view::direct::{DirectLight, runs};
+use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
+use crate::lightmap::receivers::{POINTS, Receiver};
+use crate::scene::Camera;
+use crate::transport::World;
+use bytemuck::{Pod, Zeroable, cast_slice};
+use glam::Vec4;
+use light_map::MapLight;
+use operator::GpuOperator;
+use std::sync::Arc;
+
+/// Words of a receiver, as receiver_light.wgsl has them: pixel and side, then triangle and weights of each point.
+pub(crate) const RECEIVER_WORDS: usize = 1 + 3 * POINTS;
+/// Marks the back of a pixel.
+pub(crate) const BACK_BIT: u32 = 1 << 31;
+
+/// `Params` of receiver_light.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    first: u32,
+    receivers: u32,
+    samples: u32,
+    seed: u32,
+}
+
+/// Light straight from emitters at receivers.
+pub(crate) const RECEIVER_LIGHT: KernelSpec = KernelSpec {
+    file: "radiance_probes/receiver_light.wgsl",
+    twin: "src/method/radiance_probes/light.rs: direct",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[("params", Uniform), ("receivers", Read), ("direct", ReadWrite)],
+    structs: &[&PARAMS],
+};
+const PARAMS: StructLayout = layout!(Params as "Params" { first, receivers, samples, seed });
+
+/// Renders frames on a device.
+pub struct RadianceProbesOnGpu {
+    baseline: Baseline,
+    receiver_light: Kernel,
+    receivers: wgpu::Buffer,
+    count: u32,
+    operator: GpuOperator,
+    map: MapLight,
+    direct: DirectLight,
+    params: RadianceProbeParams,
+}
+
+/// What the passes of the last frame have left on the device.
+pub struct Passes {
+    /// E_T straight from emitters, of each receiver.
+    pub direct: Vec<Rgb>,
+    /// λ of the last bounce, probe by probe.
+    pub lambda: Vec<Rgb>,
+    /// Light of the clusters' spaces, one after the other.
+    pub spaces: Vec<Rgb>,
+    /// What comes to each receiver by way of the probes.
+    pub indirect: Vec<Rgb>,
+}
+
+impl RadianceProbesOnGpu {
+    /// Uploads an operator that keeps irradiance, in pieces of `piece` bytes at the most, and compiles the passes.
+    pub fn new(gpu: Arc<Gpu>, world: &World, lighting: &Lighting, params: &RadianceProbeParams, piece: u64) -> Result<Self> {
+        let transport = &lighting.transport;
+        // The operator first: where it does not fit, nothing else need be made.
+        let operator = GpuOperator::new(&gpu, transport, piece)?;
+        operator.set_reflectance(&gpu, &lighting.reflectances(world))?;
+        let map = FrameMap::new(&world.scene.geometry, transport);
+        let baseline = Baseline::new(gpu.clone(), world, Some(&map.dark), params.supersample)?;
+        let scene = &*baseline.scene;
+        let words: Vec<u32> = transport.receivers.iter().flat_map(words_of).collect();
+        Ok(Self {
+            receiver_light: Kernel::in_scene(scene, &RECEIVER_LIGHT, &[("IRRADIANCE", 1.0)])?,
+            receivers: gpu.upload("receivers", cast_slice(&words))?,
+            count: transport.receivers.len() as u32,
+            operator,
+            map: MapLight::new(scene, &map)?,
+            direct: DirectLight::new(scene)?,
+            params: *params,
+            baseline,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        self.baseline.scene.device()
+    }
+
+    /// Whether passes are timed by the device's own clock.
+    pub fn has_clock(&self) -> bool {
+        self.baseline.scene.gpu.adapter.timestamps
+    }
+
+    /// Bytes of receivers and operator on the device.
+    pub fn probe_bytes(&self) -> u64 {
+        self.operator.bytes() + self.receivers.size()
+    }
+
+    /// How many pieces the operator lies in.
+    pub fn pieces(&self) -> usize {
+        self.operator.pieces()
+    }
+
+    /// Takes the lights and colours of a frame's world. An error where it adds shapes.
+    pub fn relight(&mut self, world: &World, lighting: &Lighting) -> Result<()> {
+        let scene = self.baseline.scene.at(world)?;
+        self.receiver_light.rebind(&scene);
+        self.direct.rebind(&scene);
+        if lighting.changes() {
+            self.operator.set_reflectance(&scene.gpu, &lighting.reflectances(world))?;
+        }
+        self.baseline.rebind(scene);
+        Ok(())
+    }
+
+    /// A frame; its light's passes are those of Table 2.
+    pub fn frame(&mut self, camera: &Camera, seed: u32, frame: u32) -> Result<BaselineFrame> {
+        let scene = self.baseline.scene.clone();
+        let gpu = &*scene.gpu;
+        let mut commands = Commands::new(gpu);
+        gpu.checked(|| {
+            self.light_receivers(&scene, &mut commands, seed)?;
+            self.operator.run(gpu, &mut commands, self.params.bounces);
+            self.map.run(&scene, &mut commands, &self.operator.indirect);
+            Ok(())
+        })
+        .flatten()?;
+        let (direct, samples) = (&self.direct, self.params.direct_samples);
+        self.baseline.frame(camera, false, commands, |commands, camera: &Camera, target: &Target| {
+            gpu.clear(&target.glossy);
+            direct.run(&scene, (commands, "diffuse"), (camera, &target.view), samples, [seed, frame])
+        })
+    }
+
+    fn light_receivers(&self, scene: &GpuScene, commands: &mut Commands, seed: u32) -> Result<()> {
+        let samples = self.params.map_samples;
+        for (first, receivers) in runs(self.count, samples) {
+            let params = Params { first, receivers, samples, seed };
+            let params = scene.gpu.uniform("parameters of receivers", &params)?;
+            let buffers = [&params, &self.receivers, &self.operator.direct];
+            commands.run("scene relight", &self.receiver_light, &buffers, [receivers, 1]);
+        }
+        Ok(())
+    }
+
+    /// Reads back what passes have left.
+    pub fn passes(&self) -> Result<Passes> {
+        let gpu = &self.baseline.scene.gpu;
+        let read = |buffer| Ok(gpu.read::<Vec4>(buffer)?.iter().map(|v| v.truncate()).collect());
+        let GpuOperator { direct, lambda, spaces, indirect, .. } = &self.operator;
+        Ok(Passes { direct: read(direct)?, lambda: read(lambda)?, spaces: read(spaces)?, indirect: read(indirect)? })
+    }
+}
+
+fn words_of(receiver: &Receiver) -> [u32; RECEIVER_WORDS] {
+    let mut words = [receiver.pixel | if receiver.back { BACK_BIT } else { 0 }; RECEIVER_WORDS];
+    for (words, p) in words[1..].chunks_exact_mut(3).zip(&receiver.points) {
+        words.copy_from_slice(&[p.triangle, p.barycentric.x.to_bits(), p.barycentric.y.to_bits()]);
+    }
+    words
+}
