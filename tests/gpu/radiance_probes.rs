@@ -55,7 +55,7 @@ pub fn every_pass_is_the_cpus(device: &Device) {
         assert!(on_gpu.probe_bytes() > transport.bytes() as u64 / 2);
         on_gpu.frame(&camera, 3, 0).unwrap();
         let found = on_gpu.passes().unwrap();
-        let cpu = lighting.light(&world, &params, 3, &mut Clock::start());
+        let cpu = lighting.light(&world, &params, (None, 3), &mut Clock::start());
         let (share, mean) = difference(&found.direct, &cpu.direct);
         let spaces = transport.project(&found.lambda);
         let mut errors = vec![
