@@ -120,8 +120,7 @@ impl Pipeline {
             }
             .into(),
             self.lightfield(bakes).into(),
-            BakeTransport { scene: scene(), probes: bakes.grid.clone(), output: bakes.transport.clone(), ..Default::default() }
-                .into(),
+            self.transport(bakes).into(),
         ]
     }
 
@@ -133,6 +132,19 @@ impl Pipeline {
             // As many texels as the other probes have, or about.
             size: Some((width * height).isqrt().next_power_of_two()),
             output: bakes.lightfield.clone(),
+            ..Default::default()
+        }
+    }
+
+    /// With as many receivers as the light map has texels.
+    fn transport(&self, bakes: &Bakes) -> BakeTransport {
+        let s = &self.settings;
+        BakeTransport {
+            scene: self.scene.clone(),
+            probes: bakes.grid.clone(),
+            texels: s.texel.is_none().then_some(s.lightmap_texels),
+            texel: s.texel,
+            output: bakes.transport.clone(),
             ..Default::default()
         }
     }

@@ -12,6 +12,7 @@ use super::shift::{Watch, shift};
 use super::skeleton::space::Space;
 use super::support::{OVERLAP, mean_overlap, radius, weight};
 use super::thin::thin;
+use crate::base::math::hash64;
 use crate::base::progress::Progress;
 use crate::transport::World;
 use crate::{Error, Result};
@@ -168,9 +169,15 @@ pub fn candidates(space: &Space) -> Vec<Vec3> {
     if near.is_empty() { within(f32::INFINITY) } else { near }
 }
 
-/// Every so-manieth of the candidates, where they are far more than there are probes to choose.
+/// Some of the candidates, scattered all over, where they are far more than there are probes to choose.
 fn enough(candidates: Vec<Vec3>, count: u32) -> Vec<Vec3> {
     let most = (CROWD * count as usize).max(LEAST_CROWD);
-    let step = candidates.len().div_ceil(most).max(1);
-    candidates.into_iter().step_by(step).collect()
+    if candidates.len() <= most {
+        return candidates;
+    }
+    let mut chosen: Vec<usize> = (0..candidates.len()).collect();
+    chosen.sort_by_key(|&i| hash64(i as u64));
+    chosen.truncate(most);
+    chosen.sort_unstable();
+    chosen.into_iter().map(|i| candidates[i]).collect()
 }

@@ -28,8 +28,8 @@ pub struct Lights {
     pub(crate) environments: Vec<Environment>,
     /// Directional emitters: indices into `Scene::emitters`.
     pub(crate) suns: Vec<u32>,
-    /// Whether a ray may meet light: there is an area light that is not dark, or an environment.
-    pub(crate) may_be_met: bool,
+    /// Whether no ray can meet light: there is neither an area light that is not dark, nor an environment.
+    pub(crate) never_met: bool,
 }
 
 /// An emitter, or a part of one, at a finite distance.
@@ -65,12 +65,12 @@ pub(crate) enum Environment {
 impl Lights {
     /// Prepares the emitters of a scene.
     pub fn new(scene: &Scene) -> Self {
-        let mut this = Self { first: vec![None; scene.emitters.len()], ..Self::default() };
+        let mut this = Self { first: vec![None; scene.emitters.len()], never_met: true, ..Self::default() };
         let mut bounds = Vec::new();
         for (i, emitter) in scene.emitters.iter().enumerate() {
             match emitter {
                 Emitter::Area { object, radiance } => {
-                    this.may_be_met |= radiance.mean() != Rgb::ZERO;
+                    this.never_met &= radiance.mean() == Rgb::ZERO;
                     let object = &scene.geometry.objects[*object as usize];
                     let mean = luminance(radiance.mean());
                     if mean > 0.0 && mean.is_finite() {
@@ -112,7 +112,7 @@ impl Lights {
             }
         }
         this.tree = LightTree::new(&bounds);
-        this.may_be_met |= !this.environments.is_empty();
+        this.never_met &= this.environments.is_empty();
         this
     }
 

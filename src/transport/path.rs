@@ -226,7 +226,7 @@ fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, 
     let from = vertex.receiver();
     let mut sum = vertex.direct(&from, light_choice, Vec2::new(light_x, light_y));
     // Direct light alone, and no ray could meet any.
-    if params.max_depth == 1 && !vertex.world.lights.may_be_met {
+    if params.max_depth == 1 && vertex.world.lights.never_met {
         return keep_finite(sum);
     }
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
