@@ -9,6 +9,7 @@ use crate::base::math::{Rgb, hash_words};
 use crate::lightmap::LightMap;
 use crate::lightmap::lookup::sides;
 use crate::lightmap::receivers::{POINTS, Receiver, spread};
+use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
 use crate::transport::path::{PathParams, transmitted_irradiance};
 use crate::transport::{Sampler, World};
@@ -106,11 +107,13 @@ impl Lighting {
         let reflectances = self.reflectances(world);
         let direct = direct(world, &transport.receivers, params.map_samples, seed);
         clock.lap("scene relight");
-        let hits = transport.hits_in(world);
+        let (hits, blockers) = transport.hits_in(world);
+        let blocking = blocking(world, &blockers, seed);
         let rows = transport.params.receiver.rows();
         let mut indirect = before.unwrap_or_else(|| vec![Rgb::ZERO; direct.len() * rows]);
         for _ in 0..params.bounces {
-            let radiance = radiance(&direct, &self.irradiance(&indirect), &reflectances);
+            let mut radiance = radiance(&direct, &self.irradiance(&indirect), &reflectances);
+            radiance.extend(&blocking);
             let lambda = transport.probe_radiance(&hits, &radiance);
             clock.lap("probe relight");
             let spaces = transport.project(&lambda);
@@ -140,6 +143,18 @@ impl Lighting {
     pub fn total(&self, light: &Light) -> Vec<Rgb> {
         light.direct.iter().zip(self.irradiance(&light.indirect).iter()).map(|(&d, i)| d + i.max(Rgb::ZERO)).collect()
     }
+}
+
+/// Diffuse radiance that shapes in the way of relight rays send back along them: of direct light, by one sample. *Ours*: in the paper they are
+/// black.
+fn blocking(world: &World, blockers: &[(Surface, Vec3)], seed: u32) -> Vec<Rgb> {
+    let of = |(i, (surface, wo)): (usize, &(Surface, Vec3))| {
+        let wi = surface.frame.to_local(*wo);
+        let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(surface, wi);
+        let mut sampler = Sampler::new(hash_words(&[seed, i as u32, 2]), 0);
+        out * transmitted_irradiance(world, surface, wi.z < 0.0, None, &PathParams::DIRECT, &mut sampler) * FRAC_1_PI
+    };
+    blockers.par_iter().enumerate().with_min_len(64).map(of).collect()
 }
 
 /// Diffuse radiance that receivers send out.

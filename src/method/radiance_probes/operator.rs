@@ -3,11 +3,11 @@
 use super::compress::Cluster;
 use super::params::TransportParams;
 use super::relight::RelightRays;
-use super::seen::NO_RECEIVER;
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::lightmap::Atlas;
 use crate::lightmap::receivers::Receiver;
+use crate::material::Surface;
 use crate::transport::World;
 use glam::Vec3;
 use half::slice::HalfFloatSliceExt;
@@ -43,20 +43,29 @@ impl Transport {
         self.rays.project(hits, radiance)
     }
 
-    /// What relight rays meet in a frame's world (§5.1): shapes that it adds block them, and send out no light themselves.
-    pub fn hits_in(&self, world: &World) -> Cow<'_, [u32]> {
+    /// What relight rays meet in a frame's world (§5.1), and the surfaces of shapes that it adds which block some of them: a ray that meets the
+    /// k-th of these has the number of receivers and k.
+    pub fn hits_in(&self, world: &World) -> (Cow<'_, [u32]>, Vec<(Surface, Vec3)>) {
         if !world.has_added() {
-            return Cow::Borrowed(&self.hits);
+            return (Cow::Borrowed(&self.hits), Vec::new());
         }
         let rays = self.rays.directions.len();
-        let unblocked = |(i, &hit): (usize, &u32)| {
+        let blocker = |(i, &hit): (usize, &u32)| {
             let receiver = self.receivers.get(hit as usize)?;
             let (p, to) = (self.probes[i / rays], receiver.surface(world, 0).p);
-            let ray = Ray { t_max: p.distance(to), ..Ray::new(p, (to - p).try_normalize()?) };
-            (!world.occluded_by_added(&ray)).then_some(hit)
+            let d = (to - p).try_normalize()?;
+            let ray = Ray { t_max: p.distance(to), ..Ray::new(p, d) };
+            if world.occluded_by_added(&ray) { Some((world.intersect(&ray)?, -d)) } else { None }
         };
-        let all = self.hits.par_iter().enumerate().with_min_len(rays);
-        Cow::Owned(all.map(|entry| unblocked(entry).unwrap_or(NO_RECEIVER)).collect())
+        let all: Vec<Option<(Surface, Vec3)>> = self.hits.par_iter().enumerate().with_min_len(rays).map(blocker).collect();
+        let (mut hits, mut blockers) = (self.hits.clone(), Vec::new());
+        for (hit, blocker) in hits.iter_mut().zip(all) {
+            if let Some(blocker) = blocker {
+                *hit = (self.receivers.len() + blockers.len()) as u32;
+                blockers.push(blocker);
+            }
+        }
+        (Cow::Owned(hits), blockers)
     }
 
     /// What the receivers get by way of the probes: `receiver.rows()` numbers each (Eq. 6).
