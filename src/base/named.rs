@@ -13,6 +13,29 @@ pub trait Parameters: Serialize + DeserializeOwned {
     fn validate(&self) -> Result<()>;
 }
 
+/// The words for an enumeration's values, both ways.
+macro_rules! words {
+    ($type:ident { $($value:ident $word:literal),+ }) => {
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str(match self { $(Self::$value => $word),+ })
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = String;
+
+            fn from_str(text: &str) -> std::result::Result<Self, String> {
+                match text {
+                    $($word => Ok(Self::$value),)+
+                    _ => Err(format!("expected one of {}", [$($word),+].join(", "))),
+                }
+            }
+        }
+    };
+}
+pub(crate) use words;
+
 /// An error where `value` is not in `range`; no range holds a NaN.
 pub fn within<T: PartialOrd + Display>(name: &str, value: T, range: RangeInclusive<T>) -> Result<()> {
     if range.contains(&value) {

@@ -51,6 +51,14 @@ pub struct Done {
     pub missing: usize,
 }
 
+impl Done {
+    /// What a summary says of items that other shards have yet to make; nothing where none is missing.
+    pub fn rest(&self, items: &str) -> String {
+        let missing = self.missing;
+        if missing > 0 { format!("; {missing}{items} are still missing: run the other shards") } else { String::new() }
+    }
+}
+
 /// Whether an earlier run with the same inputs and parameters finished this file, and nothing has changed it since.
 pub fn is_finished(file: &Path, provenance: &Provenance) -> bool {
     std::fs::read(file).is_ok_and(|bytes| ExrImage::provenance_of_whole(&bytes).as_ref() == Some(provenance))

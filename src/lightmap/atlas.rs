@@ -105,6 +105,11 @@ impl Atlas {
         let chart = self.charts.get(*self.triangle_chart.get(triangle as usize)? as usize)?;
         Some(geometry.corners(triangle).map(|p| chart.project(p)))
     }
+
+    /// Those of all triangles; NaN for triangles without a chart.
+    pub fn all_corners(&self, geometry: &Geometry) -> Vec<[Vec2; 3]> {
+        (0..geometry.triangles.len() as u32).map(|t| self.corners(geometry, t).unwrap_or([Vec2::NAN; 3])).collect()
+    }
 }
 
 /// How many texels charts take.

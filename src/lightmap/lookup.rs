@@ -95,8 +95,7 @@ pub(super) fn bilinear(p: Vec2, size: [u32; 2]) -> Option<[(usize, f32); 4]> {
 
 /// A light map from pixels in an atlas's layout.
 pub fn sides(geometry: &Geometry, atlas: &Atlas, front: Vec<Rgb>, back: Option<Vec<Rgb>>) -> LightMap {
-    let corners = (0..geometry.triangles.len() as u32).map(|t| atlas.corners(geometry, t).unwrap_or([Vec2::NAN; 3])).collect();
-    LightMap { size: atlas.size, front, back, corners }
+    LightMap { size: atlas.size, front, back, corners: atlas.all_corners(geometry) }
 }
 
 /// The file's image. Rows are added below the picture where the table needs more room.

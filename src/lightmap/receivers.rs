@@ -17,6 +17,9 @@ use rayon::prelude::*;
 /// Points of a texel.
 pub const POINTS: usize = 4;
 
+/// Marks the back of a pixel.
+pub const BACK_BIT: u32 = 1 << 31;
+
 /// Places of a texel that are tried for them.
 const TRIES: u32 = 16;
 
@@ -32,6 +35,11 @@ pub struct Receiver {
 }
 
 impl Receiver {
+    /// Pixel and side in one word.
+    pub fn word(&self) -> u32 {
+        self.pixel | if self.back { BACK_BIT } else { 0 }
+    }
+
     /// The surface at one of its points; `world` is the scene's, or a frame's.
     pub fn surface(&self, world: &World, point: usize) -> Surface {
         let p = self.points[point % POINTS];

@@ -112,7 +112,7 @@ fn atlas(coverage: &Coverage, ramp: Ramp) -> Canvas {
 
 /// How many probes see the point of each pixel, and how far it faces the camera; `None` where no surface is seen.
 fn view_counts(world: &World, coverage: &Coverage, progress: &dyn Progress) -> Vec<Option<(u32, f32)>> {
-    let camera = Camera { size: view_size(coverage.camera), ..coverage.camera.clone() };
+    let camera = coverage.camera.at_width(WIDTH as u32);
     let [width, height] = camera.size.map(|n| n as usize);
     progress.start("coverage of the view", height as u64);
     let pixel = |x: usize, y: usize| {
@@ -132,18 +132,12 @@ fn view_counts(world: &World, coverage: &Coverage, progress: &dyn Progress) -> V
     rows.concat()
 }
 
-/// The camera's shape at the picture's width.
-fn view_size(camera: &Camera) -> [u32; 2] {
-    let [width, height] = camera.size.map(|n| n.max(1) as usize);
-    [WIDTH as u32, (WIDTH * height).div_ceil(width).clamp(1, 4 * WIDTH) as u32]
-}
-
 fn view(camera: &Camera, counts: &[Option<(u32, f32)>], ramp: Ramp) -> Canvas {
     let colour = |pixel: &Option<(u32, f32)>| match *pixel {
         Some((count, cos)) => ramp.colour(count).map(|c| (f32::from(c) * (0.55 + 0.45 * cos)) as u8),
         None => BACKGROUND,
     };
-    Canvas { size: view_size(camera).map(|n| n as usize), pixels: counts.iter().map(colour).collect() }
+    Canvas { size: camera.at_width(WIDTH as u32).size.map(|n| n as usize), pixels: counts.iter().map(colour).collect() }
 }
 
 /// Numbers of probes that count together, from the least: none, one, and between powers of two.

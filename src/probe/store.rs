@@ -3,13 +3,13 @@
 use super::file::{BakedSet, Probe};
 use super::parameter_map::{ParameterMap, map_paths};
 use super::set::read_member;
-use crate::io::json;
 use crate::io::provenance::hash_of;
+use crate::io::{Provenance, json};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::Vec3;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -104,6 +104,20 @@ pub fn read_set(folder: &Path, stage: &str) -> Result<String> {
         let hint = if is_missing { format!(" (the bake is not finished: run {stage} again)") } else { String::new() };
         Error::input(&path, format!("{e}{hint}"))
     })
+}
+
+/// What every `set.json` says.
+#[derive(Deserialize)]
+struct Source {
+    provenance: Provenance,
+}
+
+/// A folder's `set.json`, which `stage` must have written; `None` where another stage did.
+pub fn read_set_of<T: DeserializeOwned>(folder: &Path, stage: &str) -> Result<Option<T>> {
+    let path = folder.join(SET_FILE);
+    let text = read_set(folder, stage)?;
+    let is_ours = json::parse::<Source>(&path, &text)?.provenance.stage == stage;
+    is_ours.then(|| json::parse(&path, &text)).transpose()
 }
 
 /// Content hash of what [`read_set`] reads.

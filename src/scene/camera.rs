@@ -65,6 +65,13 @@ impl FovAxis {
 }
 
 impl Camera {
+    /// Its view in a picture so many pixels wide, of the same shape as far as a picture may be tall: four times as tall as wide.
+    pub fn at_width(&self, width: u32) -> Self {
+        let [w, h] = self.size.map(|n| u64::from(n.max(1)));
+        let height = (u64::from(width) * h).div_ceil(w).clamp(1, 4 * u64::from(width)) as u32;
+        Self { size: [width, height], ..self.clone() }
+    }
+
     /// A pinhole at `origin` that looks at `target`.
     pub fn look_at(origin: Vec3, target: Vec3, up: Vec3, fov_x: f32, size: [u32; 2]) -> Self {
         let z = (target - origin).try_normalize().unwrap_or(Vec3::Z);

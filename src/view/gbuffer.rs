@@ -1,7 +1,7 @@
 //! The G-buffer of a novel view: one ray through each pixel's centre (§5).
 
 use super::mirror::facing_normal;
-use crate::base::math::Rgb;
+use crate::base::math::{Rgb, hash_words};
 use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::scene::Camera;
@@ -44,6 +44,15 @@ impl GBuffer {
     /// Width and height.
     pub fn size(&self) -> [usize; 2] {
         self.camera.size.map(|s| s as usize)
+    }
+
+    /// A layer: what `of` says of each pixel that shows a surface, by a random stream of its own, which is a hash of (seed, frame, pixel).
+    pub fn shade(&self, [seed, frame]: [u32; 2], of: impl Fn(&Pixel, u32) -> Rgb + Sync) -> Vec<Rgb> {
+        let pixel = |(i, pixel): (usize, &Option<Pixel>)| {
+            let stream = hash_words(&[seed, frame, i as u32]);
+            pixel.as_ref().map_or(Rgb::ZERO, |p| of(p, stream))
+        };
+        self.pixels.par_iter().enumerate().with_min_len(self.size()[0]).map(pixel).collect()
     }
 }
 

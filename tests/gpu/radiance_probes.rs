@@ -38,7 +38,7 @@ fn lighting(world: &World, order: u32, relight_rays: u32) -> Lighting {
         compress: CompressParams { most_receivers: 200, error: 0.05, ..CompressParams::default() },
         ..TransportParams::default()
     };
-    Lighting::new(world, Bake::new(world, probes.collect(), &params, &Silent).unwrap().all(), &[])
+    Lighting::new(world, Bake::new(world, probes.collect(), &params, &Silent).unwrap().all(), None)
 }
 
 pub fn every_pass_is_the_cpus(device: &Device) {

@@ -136,7 +136,7 @@ fn twins(file: &str) -> Twins {
         "radiance_probes/receiver_light.wgsl" => twins! {
             POINTS = receivers::POINTS;
             RECEIVER_WORDS = gpu_radiance_probes::RECEIVER_WORDS;
-            BACK_BIT = gpu_radiance_probes::BACK_BIT;
+            BACK_BIT = receivers::BACK_BIT;
         },
         "shared/albedo.wgsl" => twins! {
             ALBEDO_COSINES = albedo::COSINES;

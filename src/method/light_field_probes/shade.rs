@@ -8,7 +8,6 @@ use crate::material::bsdf::{Lobes, Query};
 use crate::transport::World;
 use crate::view::direct::direct;
 use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel};
-use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 
 /// What a view is made of.
@@ -39,7 +38,7 @@ impl Shading<'_> {
 
     /// The diffuse layer, linear radiance.
     pub fn diffuse(&self, view: &GBuffer) -> Vec<Rgb> {
-        self.layer(view, |p, stream| {
+        view.shade([self.seed, self.frame], |p, stream| {
             let surface = &p.surface;
             let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
             let albedo = bsdf.diffuse_albedo(surface, surface.frame.to_local(p.wo));
@@ -54,7 +53,7 @@ impl Shading<'_> {
 
     /// The glossy layer, linear radiance.
     pub fn glossy(&self, view: &GBuffer) -> Vec<Rgb> {
-        self.layer(view, |p, stream| {
+        view.shade([self.seed, self.frame], |p, stream| {
             if p.alpha.is_none() {
                 return Rgb::ZERO;
             }
@@ -66,13 +65,5 @@ impl Shading<'_> {
 
     fn direct(&self, p: &Pixel, query: Query, stream: u32) -> Rgb {
         direct(self.world, p, query, self.params.direct_samples, stream)
-    }
-
-    fn layer(&self, view: &GBuffer, of: impl Fn(&Pixel, u32) -> Rgb + Sync) -> Vec<Rgb> {
-        let pixel = |(i, pixel): (usize, &Option<Pixel>)| {
-            let stream = hash_words(&[self.seed, self.frame, i as u32]);
-            pixel.as_ref().map_or(Rgb::ZERO, |p| of(p, stream))
-        };
-        view.pixels.par_iter().enumerate().with_min_len(view.size()[0]).map(pixel).collect()
     }
 }

@@ -12,7 +12,7 @@ use crate::io::{ExrImage, Provenance, json};
 use crate::probe::octahedral::pack;
 use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, read_member};
-use crate::probe::store::read_set;
+use crate::probe::store::read_set_of;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
@@ -43,12 +43,6 @@ pub fn files(folder: &Path, index: usize) -> [PathBuf; 3] {
     ["", "_light", "_ambient"].map(|ending| folder.join(format!("{index:04}{ending}.exr")))
 }
 
-/// What every `set.json` says.
-#[derive(Deserialize)]
-struct Source {
-    provenance: Provenance,
-}
-
 impl LightFieldSet {
     /// The subcommand that writes it.
     const STAGE: &str = "bake-lightfield";
@@ -56,10 +50,8 @@ impl LightFieldSet {
     /// Reads `set.json`.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = ProbeSet::path(folder);
-        let text = read_set(folder, Self::STAGE)?;
-        let is_ours = json::parse::<Source>(&path, &text)?.provenance.stage == Self::STAGE;
-        let set = if is_ours { Some(json::parse::<Self>(&path, &text)?) } else { None };
-        set.filter(|set| set.files.len() == set.places.len())
+        read_set_of::<Self>(folder, Self::STAGE)?
+            .filter(|set| set.files.len() == set.places.len())
             .ok_or_else(|| Error::input(&path, "is not of light field probes: expected a folder that bake-lightfield wrote"))
     }
 

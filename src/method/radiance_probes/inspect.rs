@@ -17,8 +17,6 @@ const WIDTH: usize = 800;
 const ATLAS: usize = 540;
 /// Space around the parts, pixels.
 const GAP: usize = 8;
-/// A norm that is drawn brightest: everything is lost.
-const MOST: f32 = 1.0;
 
 /// Draws norms (see [`super::round_trip`]) of some receivers; others have those of receivers beside them.
 pub fn draw(world: &World, transport: &Transport, norms: &[(u32, f32)], camera: &Camera) -> Canvas {
@@ -37,14 +35,14 @@ pub fn draw(world: &World, transport: &Transport, norms: &[(u32, f32)], camera: 
     let x = atlas.size[0] + 3 * GAP;
     let words = format!("Share of light lost on its way to {} probes and back, whatever the lights", transport.probes.len());
     let y = GAP + canvas.paragraph([x, GAP], WIDTH - x - GAP, &words, INK) + LINE / 2;
-    let marks: Vec<(f32, String)> = [0.0, 0.25, 0.5, 0.75, 1.0].map(|v: f32| (v / MOST, v.to_string())).to_vec();
+    let marks: Vec<(f32, String)> = [0.0, 0.25, 0.5, 0.75, 1.0].map(|v: f32| (v, v.to_string())).to_vec();
     canvas.heat_bar([x + LETTER, y], [WIDTH - x - 4 * LETTER, LINE], [0.0, 1.0], &marks);
     canvas.paste([0, top], &view);
     canvas
 }
 
 fn colour(norm: f32) -> Colour {
-    heat(norm / MOST)
+    heat(norm)
 }
 
 fn atlas(transport: &Transport, values: &[f32]) -> Canvas {
@@ -60,9 +58,8 @@ fn atlas(transport: &Transport, values: &[f32]) -> Canvas {
 }
 
 fn view(world: &World, map: &LightMap, camera: &Camera) -> Canvas {
-    let [width, height] = camera.size.map(|n| n.max(1) as usize);
-    let size = [WIDTH, (WIDTH * height).div_ceil(width).clamp(1, 4 * WIDTH)];
-    let camera = Camera { size: size.map(|n| n as u32), ..camera.clone() };
+    let camera = camera.at_width(WIDTH as u32);
+    let size = camera.size.map(|n| n as usize);
     let pixel = |i: usize| {
         let at = Vec2::new((i % WIDTH) as f32 + 0.5, (i / WIDTH) as f32 + 0.5);
         let ray = camera.ray(at, Vec2::splat(0.5));

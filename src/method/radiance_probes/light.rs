@@ -11,6 +11,7 @@ use crate::lightmap::lookup::sides;
 use crate::lightmap::receivers::{POINTS, Receiver, spread};
 use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
+use crate::scene::Animation;
 use crate::transport::path::{PathParams, transmitted_irradiance};
 use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
@@ -65,8 +66,9 @@ pub struct Lighting {
 }
 
 impl Lighting {
-    /// In `world`, the scene's own; `changed`: materials that change.
-    pub fn new(world: &World, transport: Transport, changed: &[u32]) -> Self {
+    /// In `world`, the scene's own, whose materials may change from frame to frame.
+    pub fn new(world: &World, transport: Transport, animation: Option<&Animation>) -> Self {
+        let changed = animation.map_or_else(Vec::new, Animation::changed_materials);
         let reflectance = transport.receivers.par_iter().with_min_len(64).map(|r| reflectance(world, r)).collect();
         let material = |r: &Receiver| world.scene.geometry.object(r.points[0].triangle).material;
         let changes = |r: &u32| changed.binary_search(&material(&transport.receivers[*r as usize])).is_ok();
@@ -123,9 +125,7 @@ impl Lighting {
         }
         Light { direct, indirect }
     }
-}
 
-impl Lighting {
     /// Irradiance of what receivers keep: of sh1, by the two factors of Ramamoorthi and Hanrahan 2001.
     fn irradiance<'l>(&self, kept: &'l [Rgb]) -> Cow<'l, [Rgb]> {
         if self.normals.is_empty() {

@@ -11,27 +11,27 @@ use super::transport::{Gather, Kept};
 use crate::base::math::Basis;
 use crate::lightmap::receivers::POINTS;
 use crate::lightmap::visible::facing;
+use crate::scene::Scene;
 use crate::transport::World;
+use crate::{Error, Result};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::path::Path;
 
 /// Order of the light that comes to a receiver. *Paper*: 9.
 const ORDER: u32 = 9;
 /// Most relight rays of a probe that are followed: each of so many.
 const RAYS: usize = 1000;
 
-/// The norm at some receivers, relative to that of irradiance itself: 0 where nothing is lost, 1 where everything is.
-///
-/// An operator that keeps sh1 is measured by what it says of irradiance, its first number not being that, so there is none: `None`.
-pub fn norms(world: &World, transport: &Transport, receivers: &[u32]) -> Option<Vec<f32>> {
-    (transport.params.receiver == Kept::Irradiance).then(|| {
-        let places = transport.places();
-        let gather = transport.params.gather();
-        let harmonics = [Harmonics::new(ORDER), Harmonics::new(transport.params.sh_order)];
-        let of = |&r: &u32| norm((world, transport), &gather, &harmonics, r, &transport.row(&places, r));
-        receivers.par_iter().map(of).collect()
-    })
+/// The norm at some receivers of an operator that keeps irradiance, relative to that of irradiance itself: 0 where nothing is lost, 1 where
+/// everything is.
+pub fn norms(world: &World, transport: &Transport, receivers: &[u32]) -> Vec<f32> {
+    let places = transport.places();
+    let gather = transport.params.gather();
+    let harmonics = [Harmonics::new(ORDER), Harmonics::new(transport.params.sh_order)];
+    let of = |&r: &u32| norm((world, transport), &gather, &harmonics, r, &transport.row(&places, r));
+    receivers.par_iter().map(of).collect()
 }
 
 fn norm(
@@ -79,9 +79,16 @@ fn norm(
     length(&left) / length(&own).max(f32::MIN_POSITIVE)
 }
 
-/// Every so-manieth receiver, so that there are about `count`.
-pub fn sample(receivers: usize, count: u32) -> Vec<u32> {
-    (0..receivers).step_by(receivers.div_ceil(count.max(1) as usize).max(1)).map(|r| r as u32).collect()
+/// An operator whose round trip can be measured.
+///
+/// # Errors
+/// It cannot be read, or keeps sh1, whose first number is not irradiance.
+pub fn load(folder: &Path, scene: &Scene) -> Result<Transport> {
+    let transport = Transport::load(folder, scene)?;
+    match transport.params.receiver {
+        Kept::Irradiance => Ok(transport),
+        Kept::Sh1 => Err(Error::input(folder, "its texels keep sh1: bake with --receiver irradiance")),
+    }
 }
 
 impl Transport {

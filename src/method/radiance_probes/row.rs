@@ -13,7 +13,6 @@ use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::gpu::Gpu;
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
-use crate::scene::Animation;
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
@@ -129,8 +128,7 @@ struct OnGpu<'a> {
 /// The lighting of a setup's frames.
 fn lighting(setup: &Setup) -> Result<Lighting> {
     let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
-    let changed = setup.animation.map_or_else(Vec::new, Animation::changed_materials);
-    Ok(Lighting::new(setup.world, transport, &changed))
+    Ok(Lighting::new(setup.world, transport, setup.animation))
 }
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {

@@ -39,14 +39,18 @@ pub struct Receivers {
 impl Receivers {
     /// Of an atlas of `world`'s surfaces.
     pub fn new(world: &World, atlas: &Atlas, list: Vec<Receiver>) -> Self {
-        let geometry = &world.scene.geometry;
-        let mut index = [(); 2].map(|()| vec![NO_RECEIVER; (atlas.size[0] * atlas.size[1]) as usize]);
+        let corners = atlas.all_corners(&world.scene.geometry);
+        let index = Default::default();
+        Self { list: Vec::new(), index, corners, charts: atlas.triangle_chart.clone(), size: atlas.size }.of(list)
+    }
+
+    /// Others of the same atlas.
+    fn of(self, list: Vec<Receiver>) -> Self {
+        let mut index = [(); 2].map(|()| vec![NO_RECEIVER; (self.size[0] * self.size[1]) as usize]);
         for (i, r) in list.iter().enumerate() {
             index[usize::from(r.back)][r.pixel as usize] = i as u32;
         }
-        let triangles = 0..geometry.triangles.len() as u32;
-        let corners = triangles.map(|t| atlas.corners(geometry, t).unwrap_or([Vec2::NAN; 3])).collect();
-        Self { list, index, corners, charts: atlas.triangle_chart.clone(), size: atlas.size }
+        Self { list, index, ..self }
     }
 
     /// The receiver at a surface, on the side that `towards` points to; where its texel is none (pressed against something, say) one beside it.
@@ -108,12 +112,11 @@ impl<'a> Ground<'a> {
         let is_lit = |&r: &u32| is_seen(r) || sees_any(world, &all, r, &is_seen);
         let kept: Vec<u32> = (0..count).into_par_iter().filter(is_lit).collect();
         let seen = kept.iter().flat_map(|&r| rows[r as usize].iter().copied()).collect();
-        let receivers = Receivers::new(world, &plan.atlas, kept.iter().map(|&r| all.list[r as usize]).collect());
+        let list = kept.iter().map(|&r| all.list[r as usize]).collect();
+        let receivers = all.of(list);
         let radius = radius.unwrap_or_else(|| {
-            let places: Vec<Vec3> = kept.iter().map(|&r| all.surface(world, r, 0).p).collect();
-            let nearest = |x: &Vec3| probes.iter().map(|p| p.distance(*x)).fold(f32::INFINITY, f32::min);
-            let least = places.par_iter().map(nearest).reduce(|| 0.0, f32::max);
-            support::radius(&probes, &places, support::OVERLAP).max(least * 1.01)
+            let places: Vec<Vec3> = receivers.list.iter().map(|r| r.surface(world, 0).p).collect();
+            support::radius(&probes, &places, support::OVERLAP)
         });
         Self { world, receivers, probes, radius, seen }
     }

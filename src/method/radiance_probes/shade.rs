@@ -14,7 +14,6 @@ use crate::transport::{Sampler, World};
 use crate::view::direct::direct;
 use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Directions by which light of first order is taken in.
@@ -64,7 +63,7 @@ impl Shading<'_> {
     /// The diffuse layer, linear radiance.
     pub fn diffuse(&self, view: &GBuffer) -> Vec<Rgb> {
         let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
-        self.layer(view, |p, stream| {
+        view.shade([self.seed, self.frame], |p, stream| {
             let scene = &self.world.scene;
             let straight = direct(self.world, p, query, self.params.direct_samples, stream);
             straight
@@ -78,7 +77,7 @@ impl Shading<'_> {
     /// The glossy layer: paths along the lobes that read diffuse light from the receivers; without any, where receivers keep sh1, direct light
     /// and the linear terms of theirs as one distant light (§5.1, after Sloan 2008); else none.
     pub fn glossy(&self, view: &GBuffer) -> Vec<Rgb> {
-        self.layer(view, |p, stream| match (self.total, self.indirect) {
+        view.shade([self.seed, self.frame], |p, stream| match (self.total, self.indirect) {
             _ if p.alpha.is_none() => Rgb::ZERO,
             (Some(total), _) => self.along_lobes(p, total, hash_words(&[stream, BRANCHES[1]])),
             (None, Indirect::Irradiance(_)) => Rgb::ZERO,
@@ -88,14 +87,6 @@ impl Shading<'_> {
                 straight + self.reflected(p, &looked_up(maps, p))
             }
         })
-    }
-
-    fn layer(&self, view: &GBuffer, of: impl Fn(&Pixel, u32) -> Rgb + Sync) -> Vec<Rgb> {
-        let pixel = |(i, pixel): (usize, &Option<Pixel>)| {
-            let stream = hash_words(&[self.seed, self.frame, i as u32]);
-            pixel.as_ref().map_or(Rgb::ZERO, |p| of(p, stream))
-        };
-        view.pixels.par_iter().enumerate().with_min_len(view.size()[0]).map(pixel).collect()
     }
 
     fn along_lobes(&self, p: &Pixel, total: &LightMap, stream: u32) -> Rgb {

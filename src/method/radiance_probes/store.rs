@@ -7,13 +7,13 @@ use super::params::TransportParams;
 use super::relight::RelightRays;
 use super::seen::NO_RECEIVER;
 use crate::io::provenance::hash_file;
-use crate::io::{ExrImage, Provenance, json};
+use crate::io::{ExrImage, Provenance};
 use crate::lightmap::bake::atlas_of;
-use crate::lightmap::receivers::{POINTS, Receiver};
+use crate::lightmap::receivers::{BACK_BIT, POINTS, Receiver};
 use crate::lightmap::texels::Point;
 use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, numbered, read_member};
-use crate::probe::store::read_set;
+use crate::probe::store::read_set_of;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
@@ -24,8 +24,6 @@ use std::path::{Path, PathBuf};
 
 /// Entries of a table's row.
 const WIDTH: usize = 1024;
-/// Marks the back of a pixel.
-const BACK: u32 = 1 << 31;
 
 /// `set.json` of such a folder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,12 +53,6 @@ pub fn positions(places: &Places) -> Vec<Vec3> {
     places.used().into_iter().map(|i| places.position(i)).collect()
 }
 
-/// What every `set.json` says.
-#[derive(Deserialize)]
-struct Source {
-    provenance: Provenance,
-}
-
 impl TransportSet {
     /// The subcommand that writes it.
     const STAGE: &str = "bake-transport";
@@ -68,9 +60,7 @@ impl TransportSet {
     /// Reads `set.json`.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = ProbeSet::path(folder);
-        let text = read_set(folder, Self::STAGE)?;
-        let is_ours = json::parse::<Source>(&path, &text)?.provenance.stage == Self::STAGE;
-        let set = if is_ours { Some(json::parse::<Self>(&path, &text)?) } else { None };
+        let set = read_set_of::<Self>(folder, Self::STAGE)?;
         let set = set.ok_or_else(|| Error::input(&path, "is not of transport: expected a folder that bake-transport wrote"))?;
         if !(set.radius > 0.0 && set.radius.is_finite() && set.files.len() >= 2) {
             return Err(Error::input(&path, "holds no radius above 0 or no files: run bake-transport again"));
@@ -117,8 +107,7 @@ fn padded<T: Clone + Default>(mut column: Vec<T>, image: &ExrImage) -> Vec<T> {
 /// The receivers' table.
 pub fn encode_receivers(receivers: &[Receiver], provenance: &Provenance) -> ExrImage {
     let mut image = table(receivers.len());
-    let pixel = |r: &Receiver| r.pixel | if r.back { BACK } else { 0 };
-    image = image.clone().with_u32("pixel", padded(receivers.iter().map(pixel).collect(), &image));
+    image = image.clone().with_u32("pixel", padded(receivers.iter().map(Receiver::word).collect(), &image));
     for k in 0..POINTS {
         let column = |of: &dyn Fn(&Point) -> f32| receivers.iter().map(|r| of(&r.points[k])).collect::<Vec<_>>();
         let triangles = receivers.iter().map(|r| r.points[k].triangle).collect();
@@ -138,8 +127,8 @@ fn decode_receivers(path: &Path, image: &ExrImage, count: usize, [triangles, pix
     let mut receivers: Vec<Receiver> = pixel[..count]
         .iter()
         .map(|&p| Receiver {
-            pixel: p & !BACK,
-            back: p & BACK != 0,
+            pixel: p & !BACK_BIT,
+            back: p & BACK_BIT != 0,
             points: [Point { triangle: 0, barycentric: Vec2::ZERO }; POINTS],
         })
         .collect();

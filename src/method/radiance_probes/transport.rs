@@ -3,9 +3,11 @@
 use super::harmonics::{Harmonics, MAX_TERMS};
 use super::seen::Ground;
 use crate::base::math::Basis;
+use crate::base::named::words;
 use crate::lightmap::receivers::POINTS;
 use crate::lightmap::visible::facing;
 use crate::material::Surface;
+use crate::material::bsdf::warp;
 use crate::probe::support::weight;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -13,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::f32::consts::{PI, TAU};
 
 /// Rows that say how large rows are.
-const SCALE_ROWS: usize = 512;
+const SCALE_ROWS: u32 = 512;
 
 /// How the probes' radiance is interpolated to a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -50,29 +52,8 @@ impl Kept {
     }
 }
 
-/// The names of an enumeration's values, both ways.
-macro_rules! names {
-    ($type:ident { $($value:ident $name:literal),+ }) => {
-        impl std::fmt::Display for $type {
-            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-                f.write_str(match self { $(Self::$value => $name),+ })
-            }
-        }
-
-        impl std::str::FromStr for $type {
-            type Err = String;
-
-            fn from_str(text: &str) -> Result<Self, String> {
-                match text {
-                    $($name => Ok(Self::$value),)+
-                    _ => Err(format!("\"{text}\": expected one of {}", [$($name),+].join(", "))),
-                }
-            }
-        }
-    };
-}
-names!(Kept { Irradiance "irradiance", Sh1 "sh1" });
-names!(Interpolation { Visible "visible", Spatial "spatial", Decomposed "decomposed" });
+words!(Kept { Irradiance "irradiance", Sh1 "sh1" });
+words!(Interpolation { Visible "visible", Spatial "spatial", Decomposed "decomposed" });
 
 /// Directions over a hemisphere about +z, the same ones for every receiver: neighbours then differ by what they see alone, and their rows
 /// compress well (*Ours*).
@@ -96,13 +77,11 @@ impl Gather {
     pub fn new(rays: u32, order: u32, kept: Kept, interpolation: Interpolation) -> Self {
         let direction = |i: u32| {
             let u = Vec2::new((i as f32 + 0.5) / rays as f32, ((f64::from(i) + 0.5) * 0.618_033_988_749_895).fract() as f32);
-            let (sin_phi, cos_phi) = (u.y * TAU).sin_cos();
             let z = match kept {
                 Kept::Irradiance => (1.0 - u.x).sqrt(),
                 Kept::Sh1 => 1.0 - u.x,
             };
-            let r = (1.0 - z * z).max(0.0).sqrt();
-            Vec3::new(r * cos_phi, r * sin_phi, z)
+            warp::direction(z, u.y)
         };
         Self { directions: (0..rays).map(direction).collect(), kept, interpolation, harmonics: Harmonics::new(order) }
     }
@@ -119,8 +98,7 @@ impl Gather {
 
     /// The mean square of receivers' rows, by a sample of them: what errors of compression are measured by.
     pub fn scale(&self, ground: &Ground) -> f64 {
-        let count = ground.receivers.list.len();
-        let chosen: Vec<u32> = (0..count).step_by(count.div_ceil(SCALE_ROWS).max(1)).map(|r| r as u32).collect();
+        let chosen = sample(ground.receivers.list.len(), SCALE_ROWS);
         mean_square(&chosen.par_iter().map(|&r| self.row(ground, r)).collect::<Vec<_>>())
     }
 
@@ -134,11 +112,11 @@ impl Gather {
         let mut sums = Sums::new(self.kept.rows(), support.len(), self.terms());
         let back = ground.receivers.list[receiver as usize].back;
         let bsdf = &ground.world.scene.materials[surfaces[0].material as usize].bsdf;
+        let frames = surfaces.map(|s| Basis::from_normal(s.frame.n * if back { -1.0 } else { 1.0 }));
         let mut parts = Parts::new(support.len());
         for (k, &local) in self.directions.iter().enumerate() {
             let surface = &surfaces[k % POINTS];
-            let normal = surface.frame.n * if back { -1.0 } else { 1.0 };
-            let d = Basis::from_normal(normal).to_world(local);
+            let d = frames[k % POINTS].to_world(local);
             if d.dot(facing(surface, back)) <= 0.0 {
                 continue;
             }
@@ -210,25 +188,27 @@ struct Sums {
     kinds: usize,
     terms: usize,
     values: Vec<[f32; LANES]>,
+    /// Those of the directions of a group.
+    y: [[f32; LANES]; MAX_TERMS],
 }
 
 impl Sums {
     fn new(kinds: usize, probes: usize, terms: usize) -> Self {
-        Self { kinds, terms, values: vec![[0.0; LANES]; kinds * probes.div_ceil(LANES) * terms] }
+        let values = vec![[0.0; LANES]; kinds * probes.div_ceil(LANES) * terms];
+        Self { kinds, terms, values, y: [[0.0; LANES]; MAX_TERMS] }
     }
 
     /// Adds a ray, `measure` times what it brings.
     fn add(&mut self, harmonics: &Harmonics, parts: &Parts, measure: &[f32; 4]) {
-        let mut y = [[0.0; LANES]; MAX_TERMS];
         for (group, (weights, towards)) in parts.weights.iter().zip(&parts.towards).enumerate() {
             if weights.iter().all(|&w| w == 0.0) {
                 continue;
             }
-            harmonics.evaluate_lanes(*towards, &mut y);
+            harmonics.evaluate_lanes(*towards, &mut self.y);
             for (kind, m) in measure[..self.kinds].iter().enumerate() {
                 let factors = weights.map(|w| w * m);
                 let at = (kind * parts.weights.len() + group) * self.terms;
-                for (sum, y) in self.values[at..at + self.terms].iter_mut().zip(&y) {
+                for (sum, y) in self.values[at..at + self.terms].iter_mut().zip(&self.y) {
                     for k in 0..LANES {
                         sum[k] += factors[k] * y[k];
                     }
@@ -247,6 +227,11 @@ impl Sums {
             .map(|(kind, slot, j)| value(kind, slot, j))
             .collect()
     }
+}
+
+/// Every so-manieth receiver, so that there are about `count`.
+pub fn sample(receivers: usize, count: u32) -> Vec<u32> {
+    (0..receivers).step_by(receivers.div_ceil(count.max(1) as usize).max(1)).map(|r| r as u32).collect()
 }
 
 /// Mean square of rows that are not zero: what errors are measured by.

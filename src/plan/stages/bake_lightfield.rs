@@ -157,7 +157,7 @@ impl BakeLightfield {
 
     fn outcome(&self, params: &LightFieldBakeParams, done: Done, blocked: usize, seconds: f64) -> Outcome {
         let Done { made, kept, missing } = done;
-        let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
+        let rest = done.rest("");
         let LightFieldBakeParams { size, bounces, .. } = *params;
         Outcome {
             summary: format!(

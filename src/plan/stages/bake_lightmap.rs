@@ -119,8 +119,7 @@ impl BakeLightmap {
     fn outcome(&self, plan: &Plan, params: &LightMapParams, done: Done, device: &str, times: [f64; 3]) -> Outcome {
         let atlas = &plan.atlas;
         let ([width, height], Done { kept, missing, .. }, [loaded, planned, seconds]) = (atlas.size, done, times);
-        let state =
-            if missing > 0 { format!("; {missing} blocks are still missing: run the other shards") } else { String::new() };
+        let state = done.rest(" blocks");
         Outcome {
             summary: format!(
                 "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",

@@ -279,7 +279,7 @@ impl BakeProbes {
 
     fn outcome(&self, params: &ProbeBakeParams, done: Done, traced: Traced, device: &str, seconds: f64) -> Outcome {
         let Done { made, kept, missing } = done;
-        let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
+        let rest = done.rest("");
         Outcome {
             summary: format!(
                 "{}: {made} probes baked, {kept} kept, {} glossy texels at {:.0} paths, {seconds:.1} s on {device}{rest}",

@@ -149,7 +149,7 @@ impl BakeTransport {
 
     fn outcome(&self, ground: &Ground, done: Done, seconds: f64) -> Outcome {
         let Done { made, kept, missing } = done;
-        let rest = if missing > 0 { format!("; {missing} are still missing: run the other shards") } else { String::new() };
+        let rest = done.rest("");
         let (receivers, probes, radius) = (ground.receivers.list.len(), ground.probes.len(), ground.radius);
         Outcome {
             summary: format!(

@@ -4,8 +4,8 @@ use crate::base::named::within;
 use crate::io::json;
 use crate::io::picture;
 use crate::method::radiance_probes::inspect::draw;
-use crate::method::radiance_probes::operator::Transport;
-use crate::method::radiance_probes::round_trip::{norms, sample};
+use crate::method::radiance_probes::round_trip::{load, norms};
+use crate::method::radiance_probes::transport::sample;
 use crate::plan::option::stage;
 use crate::plan::views::views;
 use crate::plan::{Context, Outcome};
@@ -50,15 +50,14 @@ impl InspectTransport {
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
         let world = cx.opaque_world(&self.scene)?;
-        let transport = Transport::load(&self.probes, &world.scene)?;
+        let transport = load(&self.probes, &world.scene)?;
         let views = views(&world.scene, self.path.as_deref(), None, None)?;
         let number = self.frame.unwrap_or(0) as usize;
         let Some(view) = views.get(number) else {
             return Err(Error::Request(format!("--frame {number}: the path has frames 0 to {}", views.len() - 1)));
         };
         let receivers = sample(transport.receivers.len(), self.receivers.unwrap_or(RECEIVERS));
-        let found = norms(&world, &transport, &receivers)
-            .ok_or_else(|| Error::input(&self.probes, "its texels keep sh1: bake with --receiver irradiance"))?;
+        let found = norms(&world, &transport, &receivers);
         let list: Vec<(u32, f32)> = receivers.into_iter().zip(found).collect();
         draw(&world, &transport, &list, &view.camera).write(&self.output)?;
         if let Some(table) = &self.table {

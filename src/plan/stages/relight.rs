@@ -81,8 +81,7 @@ impl Relight {
         if frames.is_empty() {
             return Err(Error::Request(format!("--frames: there are frames 0 to {}", count - 1)));
         }
-        let changed = animation.as_ref().map_or_else(Vec::new, Animation::changed_materials);
-        let lighting = Lighting::new(&world, transport, &changed);
+        let lighting = Lighting::new(&world, transport, animation.as_ref());
         let mut timings = Timings::of("radiance-probes");
         // Light maps are of the scene's own triangles.
         let geometry = &world.scene.geometry;

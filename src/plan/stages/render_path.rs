@@ -1,6 +1,7 @@
 //! `render-path`.
 
 use crate::base::clock::timed;
+use crate::base::named::words;
 use crate::gpu::camera;
 use crate::io::Provenance;
 use crate::io::provenance::hash_file;
@@ -94,26 +95,6 @@ pub enum Aov {
     All,
 }
 
-macro_rules! words {
-    ($type:ident { $($value:ident $word:literal),+ }) => {
-        impl std::fmt::Display for $type {
-            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-                f.write_str(match self { $(Self::$value => $word),+ })
-            }
-        }
-
-        impl std::str::FromStr for $type {
-            type Err = String;
-
-            fn from_str(text: &str) -> std::result::Result<Self, String> {
-                match text {
-                    $($word => Ok(Self::$value),)+
-                    _ => Err(format!("expected one of {}", [$($word),+].join(", "))),
-                }
-            }
-        }
-    };
-}
 words!(Aov { All "all" });
 words!(LayerChoice { All "all", Full "full" });
 words!(FilterChoice { Box "box", Scene "scene" });

@@ -27,8 +27,6 @@ use std::sync::Arc;
 
 /// Words of a receiver, as receiver_light.wgsl has them: pixel and side, then triangle and weights of each point.
 pub(crate) const RECEIVER_WORDS: usize = 1 + 3 * POINTS;
-/// Marks the back of a pixel.
-pub(crate) const BACK_BIT: u32 = 1 << 31;
 
 /// `Params` of receiver_light.wgsl.
 #[repr(C)]
@@ -170,7 +168,7 @@ impl RadianceProbesOnGpu {
 }
 
 fn words_of(receiver: &Receiver) -> [u32; RECEIVER_WORDS] {
-    let mut words = [receiver.pixel | if receiver.back { BACK_BIT } else { 0 }; RECEIVER_WORDS];
+    let mut words = [receiver.word(); RECEIVER_WORDS];
     for (words, p) in words[1..].chunks_exact_mut(3).zip(&receiver.points) {
         words.copy_from_slice(&[p.triangle, p.barycentric.x.to_bits(), p.barycentric.y.to_bits()]);
     }

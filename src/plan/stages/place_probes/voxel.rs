@@ -1,10 +1,11 @@
 //! `place-probes --method voxel`.
 
 use super::{Ground, PlaceProbes, percent};
+use crate::Result;
 use crate::base::clock::seconds;
 use crate::io::provenance::hash_file;
-use crate::method::radiance_probes::operator::Transport;
-use crate::method::radiance_probes::round_trip::{norms, sample};
+use crate::method::radiance_probes::round_trip::{load, norms};
+use crate::method::radiance_probes::transport::sample;
 use crate::plan::{Context, Outcome};
 use crate::probe::nonuniform::{NonuniformParams, Reachable};
 use crate::probe::placement::{Density, Placement};
@@ -12,7 +13,6 @@ use crate::probe::places::ProbeList;
 use crate::probe::set::ProbeSet;
 use crate::probe::sparse::{COUNT, Need, Sparse, SparseParams, place};
 use crate::transport::World;
-use crate::{Error, Result};
 use serde_json::json;
 
 /// Receivers that say where probes are needed.
@@ -57,11 +57,10 @@ impl PlaceProbes {
     /// What a transport of other probes loses at receivers, on the way to them and back (§5.2).
     fn needs(&self, cx: &Context, world: &World) -> Result<Vec<Need>> {
         let Some(folder) = &self.refine_by else { return Ok(Vec::new()) };
-        let transport = Transport::load(folder, &world.scene)?;
+        let transport = load(folder, &world.scene)?;
         let receivers = sample(transport.receivers.len(), RECEIVERS);
         cx.listener.detail(&format!("what {} receivers lose on the way to the probes of {}", receivers.len(), folder.display()));
-        let norms = norms(world, &transport, &receivers)
-            .ok_or_else(|| Error::input(folder, "its texels keep sh1: bake with --receiver irradiance"))?;
+        let norms = norms(world, &transport, &receivers);
         Ok(receivers.iter().map(|&r| transport.place(world, r)).zip(norms).collect())
     }
 
