@@ -94,7 +94,7 @@ fn probes_may_stand_anywhere() {
 fn bakes_are_the_same_in_shards_on_one_thread_and_after_damage() {
     let f = folder();
     f.success(PLACE);
-    let small = BAKE.replace("128", "32");
+    let small = BAKE.replace("128", "16");
     f.success(&format!("{small} -o whole"));
     let whole = files(&f, "whole");
     // Eight probes of three files, and the set.

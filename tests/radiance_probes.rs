@@ -102,9 +102,68 @@ fn frames_have_the_light_of_path_tracing_whatever_moves() {
     assert!(red("frames/0002.exr") < 0.8 * red("frames/0000.exr"), "walls turn red");
 }
 
+/// Probes of light fields hold the light of their bake, the scene's own lamp; another method's diffuse light makes theirs anew.
+#[test]
+fn reflections_follow_a_light_that_moves_by_light_field_probes() {
+    let f = folder();
+    f.success(&format!("{BAKE} -o transport"));
+    f.success("bake-lightfield scene.xml --probes probes.json --size 64 --spp 1 --bounces 1 -o lightfield");
+    const JOINED: &str =
+        "render-path scene.xml --path path.json --method light-field-probes --probes lightfield --diffuse radiance-probes";
+    f.success(&format!(
+        "{JOINED} --diffuse-probes transport --lights lights.json --samples 32 --set direct_samples=32 -o frames"
+    ));
+    f.success(&format!("{RENDER} --probes transport --lights lights.json -o own"));
+    f.success(
+        "render-path scene.xml --path path.json --method path-trace --spp 256 --lights lights.json --device cpu -o reference",
+    );
+    for frame in ["0000.exr", "0001.exr", "0002.exr"] {
+        let of = |folder: &str, name: &str| layer(&f, &format!("{folder}/{frame}"), name);
+        assert!(of("frames", "diffuse") == of("own", "diffuse"), "{frame}");
+        let [ours, theirs] = ["frames", "reference"].map(|folder| of(folder, "glossy").iter().sum::<Rgb>());
+        assert!((ours / theirs - 1.0).abs().max_element() < 0.06, "{frame}: {ours} for {theirs}");
+    }
+    assert!(f.refusal(&format!("{JOINED} -o none")).contains("--diffuse-probes DIR, written by bake-transport"));
+    let glossy = "render-path scene.xml --method glossy-probes --probes p --curvature c --lights lights.json -o none";
+    assert!(f.refusal(glossy).contains("its probes hold the light that was baked"));
+    let refused = f.refusal(&JOINED.replace("--diffuse radiance-probes", "--diffuse ulr --diffuse-probes transport -o none"));
+    assert!(refused.contains("--diffuse ulr: it has no light for others; radiance-probes has"), "{refused}");
+}
+
+/// A ball in the air, away from the lamp's light: without a volume its underside is black.
+#[test]
+fn shapes_that_a_frame_adds_have_light_by_way_of_the_volume() {
+    let f = folder();
+    let ball = r#"{"objects": [{"type": "sphere", "radius": 0.5, "position": [-0.8, -0.3, 0], "albedo": [0.7, 0.7, 0.7]}]}"#;
+    std::fs::write(f.at("ball.json"), ball).unwrap();
+    f.success(&format!("{BAKE} --volume 0.4 -o volume"));
+    f.success(&format!("{BAKE} -o transport"));
+    for folder in ["volume", "transport"] {
+        f.success(&format!(
+            "{RENDER} --probes {folder} --lights ball.json --set direct_samples=64 --set bounces=8 -o frames-{folder}"
+        ));
+    }
+    f.success(
+        "render-path scene.xml --path path.json --method path-trace --spp 256 --lights ball.json --device cpu -o reference",
+    );
+    let layer = |folder: &str| layer(&f, &format!("{folder}/0000.exr"), "diffuse");
+    let [without, with, expected] = ["frames-transport", "frames-volume", "reference"].map(layer);
+    // Pixels that show the ball, and no other, differ much between the first two.
+    let ball: Vec<usize> = (0..864).filter(|&i| with[i].y > 1.02 * without[i].y && without[i].y < 0.9 * with[i].y).collect();
+    assert!(ball.len() > 40, "{}", ball.len());
+    let mean = |pixels: &[Rgb]| ball.iter().map(|&i| pixels[i]).sum::<Rgb>() / ball.len() as f32;
+    let [without, with, expected] = [without, with, expected].map(|pixels| mean(&pixels));
+    assert!((with / expected - 1.0).abs().max_element() < 0.08, "{with} for {expected}");
+    assert!(without.y < 0.7 * expected.y, "{without} for {expected}");
+    assert!(f.refusal(&format!("{BAKE} --volume 0.001 -o fine")).contains("--volume 0.001"));
+    std::fs::remove_file(f.at("volume/volume.exr")).unwrap();
+    assert!(f.refusal(&format!("{RENDER} --probes volume -o again")).contains("volume.exr"));
+}
+
 #[test]
 fn shards_and_threads_make_the_same_files_and_finished_ones_are_kept() {
     let f = folder();
+    const BAKE: &str = "bake-transport scene.xml --probes probes.json --texel 0.15 --rays 128 --relight-rays 1000 --volume 0.5";
     f.success(&format!("{BAKE} --threads 1 -o whole"));
     assert!(f.success(&format!("{BAKE} --shard 1/2 -o parts")).contains("still missing"));
     assert!(f.refusal(&format!("{RENDER} --probes parts -o frames")).contains("run bake-transport"));

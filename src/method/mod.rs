@@ -4,6 +4,7 @@
 
 #[cfg(test)]
 mod contract;
+pub mod diffuse;
 pub mod glossy_probes;
 pub mod image_space_gather;
 pub mod light_field_probes;
@@ -23,6 +24,7 @@ use crate::transport::World;
 use crate::view::View;
 use crate::view::layers::LayerImages;
 use crate::{Error, Result};
+use diffuse::{DiffuseConstructor, Joined};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -67,6 +69,8 @@ pub struct Method {
     pub cpu: Constructor,
     /// Makes its renderer on a GPU; `None` where there is none.
     pub gpu: Option<GpuConstructor>,
+    /// Makes its diffuse light for the frames of others; `None` where it has none for them.
+    pub diffuse: Option<DiffuseConstructor>,
 }
 
 /// Makes a renderer from what frames are made of.
@@ -224,6 +228,8 @@ pub struct Setup<'a> {
     pub curvature: Option<&'a CurvatureMap>,
     /// Folder of probes.
     pub probes: Option<&'a Path>,
+    /// Whose diffuse light frames have, where it is not the method's own.
+    pub diffuse: Option<&'a Joined>,
     /// Whether frames shall show the buffers of their passes.
     pub inspect: bool,
     /// Memory that a GPU may be filled with, bytes.

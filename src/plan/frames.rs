@@ -121,6 +121,9 @@ impl Frames<'_> {
             "method": self.method.name, "frame": view.frame, "aov": self.setup.inspect, "camera": describe(&view.camera),
             "parameters": parameters,
         });
+        if let Some(joined) = self.setup.diffuse {
+            parameters["diffuse"] = json!({ "method": joined.method.name, "parameters": joined.parameters });
+        }
         // What is seen, not what is lit by: no part of the scene's content.
         if self.setup.world.scene.hide_emitters {
             parameters["hide_emitters"] = true.into();

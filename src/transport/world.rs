@@ -131,6 +131,11 @@ impl World {
         self.added.is_some()
     }
 
+    /// Whether a surface is of a shape that an animation adds.
+    pub fn is_added(&self, surface: &Surface) -> bool {
+        surface.triangle as usize >= self.facets.len()
+    }
+
     /// Whether a shape that an animation adds blocks a ray.
     pub fn occluded_by_added(&self, ray: &Ray) -> bool {
         self.added.as_deref().is_some_and(|added| added.bvh.occluded(&self.scene, ray))

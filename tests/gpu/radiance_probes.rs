@@ -53,7 +53,7 @@ pub fn every_pass_is_the_cpus(device: &Device) {
         let mut on_gpu = RadianceProbesOnGpu::new(gpu.clone(), &world, &lighting, &params, piece).unwrap();
         assert_eq!(on_gpu.pieces() > 1, piece == 40_000, "{} pieces", on_gpu.pieces());
         assert!(on_gpu.probe_bytes() > transport.bytes() as u64 / 2);
-        on_gpu.frame(&camera, 3, 0).unwrap();
+        on_gpu.frame(&camera, [3, 0], false).unwrap();
         let found = on_gpu.passes().unwrap();
         let cpu = lighting.light(&world, &params, (None, 3), &mut Clock::start());
         let (share, mean) = difference(&found.direct, &cpu.direct);
@@ -85,6 +85,7 @@ pub fn commands_render_them(device: &Device) {
         ("probes-direct", "--set bounces=0", 1e-3),
         ("probes-lights", "--lights lights.json", 1e-3),
         ("probes-dark", "--lights dark.json", 1e-3),
+        ("probes-feedback", "--lights lights.json --set bounces=1 --set feedback=true", 1e-3),
     ] {
         let (frames, timings) = device.baked().both(device, name, &format!("--method radiance-probes {options}"));
         for images in &frames {

@@ -2,8 +2,9 @@
 
 use reprobe::io::jobs::Shard;
 use reprobe::method::radiance_probes::compress::CompressParams;
+use reprobe::method::radiance_probes::interpolate::Interpolation;
 use reprobe::method::radiance_probes::params::TransportParams;
-use reprobe::method::radiance_probes::transport::{Interpolation, Kept};
+use reprobe::method::radiance_probes::transport::Kept;
 use reprobe::plan::stages::BakeTransport;
 use std::path::PathBuf;
 
@@ -16,6 +17,7 @@ use std::path::PathBuf;
   reprobe place-probes room/scene.xml --path room/path.json --count 60 -o probes.json
   reprobe bake-transport room/scene.xml --probes probes.json -o transport/
   reprobe bake-transport room/scene.xml --probes probes.json -o transport/ --texels 50000 --sh-order 4
+  reprobe bake-transport room/scene.xml --probes probes.json -o transport/ --volume 0.5
   reprobe render-path room/scene.xml --path room/path.json --method radiance-probes --probes transport/ -o frames/")]
 pub struct Args {
     /// Mitsuba scene, XML or JSON
@@ -52,6 +54,9 @@ pub struct Args {
     /// How far a probe reaches, metres [default: so far that ten of them reach a texel, on average]
     #[arg(long, value_name = "M")]
     radius: Option<f32>,
+    /// Edge of the cells of an irradiance volume, metres: receivers in free space too, for shapes that --lights adds
+    #[arg(long, value_name = "M")]
+    volume: Option<f32>,
     /// Relative error of the compressed operator
     #[arg(long, value_name = "E", default_value_t = CompressParams::default().error)]
     error: f32,
@@ -78,6 +83,7 @@ impl Args {
             rays,
             relight_rays,
             radius,
+            volume,
             error,
             most_terms,
             shard,
@@ -94,6 +100,7 @@ impl Args {
             rays: Some(rays),
             relight_rays: Some(relight_rays),
             radius,
+            volume,
             error: Some(error),
             most_terms: Some(most_terms),
             shard,

@@ -49,6 +49,13 @@ pub struct Args {
     lights: Option<PathBuf>,
     #[arg(long, value_name = "DIR", help = used_by("probes", "the baked probes"))]
     probes: Option<PathBuf>,
+    #[arg(long, value_name = "METHOD", help = used_by("diffuse", "diffuse layer of another method, by whose light its own probes are lit \
+        anew in every frame, so that --lights changes all light: radiance-probes"))]
+    diffuse: Option<String>,
+    #[arg(long, value_name = "DIR", help = used_by("diffuse-probes", "the baked probes of that method"))]
+    diffuse_probes: Option<PathBuf>,
+    #[arg(long, value_name = "NAME=VALUE", help = used_by("diffuse-set", "a parameter of that method, like bounces=8"))]
+    diffuse_set: Vec<String>,
     #[arg(long, value_name = "FILE.exr", help = used_by("lightmap", "the diffuse light"))]
     lightmap: Option<PathBuf>,
     #[arg(long, value_name = "FILE.exr", help = used_by("curvature", "curvatures of the scene"))]
@@ -108,6 +115,9 @@ impl Args {
             size: self.size,
             method: Some(self.method),
             probes: self.probes,
+            diffuse: self.diffuse,
+            diffuse_probes: self.diffuse_probes,
+            diffuse_set: self.diffuse_set,
             lightmap: self.lightmap,
             curvature: self.curvature,
             supersample: self.supersample,

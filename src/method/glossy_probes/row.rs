@@ -42,6 +42,7 @@ pub const METHOD: Method = Method {
     for_scene: as_given,
     cpu,
     gpu: Some(gpu),
+    diffuse: None,
 };
 
 /// What the options come to.

@@ -30,6 +30,7 @@ pub const METHOD: Method = Method {
     for_scene: as_given,
     cpu,
     gpu: Some(gpu),
+    diffuse: None,
 };
 
 fn parameters(options: &Options) -> Result<Value> {

@@ -17,6 +17,7 @@ pub mod march;
 pub mod octree;
 pub mod probe;
 pub mod pyramid;
+pub mod relight;
 mod row;
 pub mod shade;
 pub mod store;

@@ -33,6 +33,7 @@ pub const METHOD: Method = Method {
     for_scene,
     cpu,
     gpu: Some(gpu),
+    diffuse: None,
 };
 
 /// All parameters.

@@ -2,17 +2,20 @@
 
 use super::cluster::groups;
 use super::compress::{Cluster, compress};
+use super::interpolate::Row;
 use super::operator::Transport;
 use super::params::TransportParams;
 use super::relight::RelightRays;
 use super::seen::Ground;
-use super::transport::{Gather, Row};
+use super::transport::{Gather, mean_square, sample};
+use super::volume::{Space, Volume};
 use crate::base::progress::Progress;
 use crate::lightmap::{Atlas, Plan};
 use crate::transport::World;
 use crate::{Error, Result};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A bake that is ready to start.
 pub struct Bake<'a> {
@@ -23,7 +26,12 @@ pub struct Bake<'a> {
     gather: Gather,
     scale: f64,
     groups: Vec<Vec<u32>>,
+    /// Receivers in free space, the mean square of their rows, and their groups.
+    space: Option<(Space, f64, Vec<Vec<u32>>)>,
 }
+
+/// Rows that say how large those in free space are.
+const SCALE_ROWS: u32 = 128;
 
 impl<'a> Bake<'a> {
     /// Finds the receivers of `world`, and what `probes` see of them.
@@ -42,18 +50,40 @@ impl<'a> Bake<'a> {
         let groups = groups(&points, params.compress.most_receivers as usize);
         let gather = params.gather();
         let scale = gather.scale(&ground);
-        Ok(Self { ground, params: *params, atlas: plan.atlas, gather, scale, groups })
+        let space = params.volume.map(|spacing| space(&ground, spacing, params)).transpose()?;
+        Ok(Self { ground, params: *params, atlas: plan.atlas, gather, scale, groups, space })
     }
 
-    /// Number of groups.
+    /// Number of groups: those of texels, and after them those in free space.
     pub fn groups(&self) -> usize {
-        self.groups.len()
+        self.groups.len() + self.groups_in_space()
     }
 
-    /// The clusters of a group's receivers.
+    /// Number of groups of receivers in free space.
+    pub fn groups_in_space(&self) -> usize {
+        self.space.as_ref().map_or(0, |(_, _, groups)| groups.len())
+    }
+
+    /// The volume, without its clusters.
+    pub fn volume(&self) -> Option<Volume> {
+        self.space.as_ref().map(|(space, ..)| Volume { grid: space.grid, cells: space.cells.clone(), clusters: Vec::new() })
+    }
+
+    /// The clusters of a group's receivers; of those in free space, by their number there.
     pub fn group(&self, i: usize) -> Vec<Cluster> {
-        let rows: Vec<Row> = self.groups[i].par_iter().map(|&r| self.gather.row(&self.ground, r)).collect();
-        compress(self.groups[i].clone(), rows, &self.gather, (&self.params.compress, self.scale))
+        let (terms, compression) = (self.params.terms(), &self.params.compress);
+        match (self.groups.get(i), &self.space) {
+            (Some(group), _) => {
+                let rows: Vec<Row> = group.par_iter().map(|&r| self.gather.row(&self.ground, r)).collect();
+                compress(group.clone(), rows, terms, (compression, self.scale))
+            }
+            (None, Some((space, scale, groups))) => {
+                let group = &groups[i - self.groups.len()];
+                let rows: Vec<Row> = group.par_iter().map(|&point| space.row(&self.ground, point)).collect();
+                compress(group.clone(), rows, terms, (compression, *scale))
+            }
+            (None, None) => Vec::new(),
+        }
     }
 
     /// The receiver that each relight ray of each probe meets.
@@ -67,8 +97,11 @@ impl<'a> Bake<'a> {
 
     /// The whole operator.
     pub fn all(self) -> Transport {
+        let clusters = |groups: Range<usize>| groups.into_par_iter().flat_map_iter(|i| self.group(i)).collect();
+        let texels = self.groups.len();
         Transport {
-            clusters: (0..self.groups()).into_par_iter().flat_map_iter(|i| self.group(i)).collect(),
+            clusters: clusters(0..texels),
+            volume: self.volume().map(|volume| Volume { clusters: clusters(texels..self.groups()), ..volume }),
             rays: self.rays(),
             hits: self.hits(),
             radius: self.ground.radius,
@@ -78,4 +111,13 @@ impl<'a> Bake<'a> {
             receivers: self.ground.receivers.list,
         }
     }
+}
+
+fn space(ground: &Ground, spacing: f32, params: &TransportParams) -> Result<(Space, f64, Vec<Vec<u32>>)> {
+    let space = Space::new(ground, spacing, params.rays, (params.sh_order, params.interpolation))?;
+    let points = space.points();
+    let chosen = sample(points.len(), SCALE_ROWS);
+    let scale = mean_square(&chosen.par_iter().map(|&point| space.row(ground, point)).collect::<Vec<_>>());
+    let groups = groups(&points, params.compress.most_receivers as usize);
+    Ok((space, scale, groups))
 }

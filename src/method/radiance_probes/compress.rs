@@ -6,7 +6,7 @@
 //! another. *Reading*: the error is the root of the mean square over a cluster's rows, relative to that over all receivers' rows, so that dark
 //! corners do not ask for more than they show.
 
-use super::transport::{Gather, Row};
+use super::interpolate::Row;
 use crate::base::math::{hash_words, unit};
 use half::f16;
 use nalgebra_sparse::na::{DMatrix, SymmetricEigen};
@@ -59,11 +59,11 @@ struct Rows {
     matrix: DMatrix<f32>,
 }
 
-/// Compresses the rows of a group of receivers, in as many clusters as that takes. `scale`: the mean square of all receivers' rows.
-pub fn compress(group: Vec<u32>, rows: Vec<Row>, gather: &Gather, (params, scale): (&CompressParams, f64)) -> Vec<Cluster> {
+/// Compresses the rows of a group of receivers, in as many clusters as that takes. `terms`: harmonics of a probe; `scale`: the mean square of all receivers' rows.
+pub fn compress(group: Vec<u32>, rows: Vec<Row>, terms: usize, (params, scale): (&CompressParams, f64)) -> Vec<Cluster> {
     let (mut done, mut open) = (Vec::new(), vec![(group, rows)]);
     while let Some((group, rows)) = open.pop() {
-        match Rows::new(group, &rows, gather.terms()).cluster(params, scale) {
+        match Rows::new(group, &rows, terms).cluster(params, scale) {
             Ok(cluster) => done.push(cluster),
             Err(Split { receivers, is_first }) => {
                 let (mut a, mut b) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
@@ -191,7 +191,7 @@ fn orthonormal(mut columns: DMatrix<f32>) -> DMatrix<f32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::transport::{Interpolation, Kept, mean_square};
+    use super::super::transport::mean_square;
     use super::*;
 
     /// Rows that are sums of `rank` patterns over 3 probes of order 1, with noise.
@@ -232,13 +232,12 @@ mod tests {
 
     #[test]
     fn rows_of_low_rank_come_back_to_the_error_that_is_asked_for() {
-        for (kinds, kept) in [(1, Kept::Irradiance), (4, Kept::Sh1)] {
-            let gather = Gather::new(4, 1, kept, Interpolation::Visible);
+        for kinds in [1, 4] {
             for (rank, noise, wanted) in [(3, 0.0, 1e-3), (3, 0.01, 0.02), (9, 0.0, 0.1)] {
                 let all = rows(300, rank, noise, kinds);
                 let params = CompressParams { error: wanted, ..CompressParams::default() };
                 let scale = mean_square(&all);
-                let clusters = compress((0..300).collect(), rows(300, rank, noise, kinds), &gather, (&params, scale));
+                let clusters = compress((0..300).collect(), rows(300, rank, noise, kinds), 4, (&params, scale));
                 let found = error(&clusters, &all, kinds);
                 assert!(found < f64::from(wanted) * 1.05, "{rank} {noise} {kinds}: {found}");
                 let mut receivers: Vec<u32> = clusters.iter().flat_map(|c| c.receivers.clone()).collect();
@@ -253,26 +252,24 @@ mod tests {
 
     #[test]
     fn few_coefficients_are_made_up_for_by_more_clusters() {
-        let gather = Gather::new(4, 1, Kept::Irradiance, Interpolation::Visible);
         let all = rows(1000, 6, 0.0, 1);
         let params = CompressParams { error: 0.05, most_terms: 4, ..CompressParams::default() };
-        let clusters = compress((0..1000).collect(), rows(1000, 6, 0.0, 1), &gather, (&params, mean_square(&all)));
+        let clusters = compress((0..1000).collect(), rows(1000, 6, 0.0, 1), 4, (&params, mean_square(&all)));
         assert!(clusters.len() > 1 && clusters.iter().all(|c| c.rank <= 4));
         assert!(error(&clusters, &all, 1) < 0.06, "{}", error(&clusters, &all, 1));
     }
 
     #[test]
     fn rows_of_nothing_and_rows_that_are_all_alike_are_no_trouble() {
-        let gather = Gather::new(4, 1, Kept::Irradiance, Interpolation::Visible);
         let params = CompressParams::default();
         let zero = |_| Row { probes: vec![1], values: vec![0.0; 4] };
-        let dark = compress((0..50).collect(), (0..50).map(zero).collect(), &gather, (&params, 1.0));
+        let dark = compress((0..50).collect(), (0..50).map(zero).collect(), 4, (&params, 1.0));
         assert_eq!((dark.len(), dark[0].rank, dark[0].probes.len()), (1, 0, 0));
         let one = |r: u32| Row { probes: vec![1], values: if r == 7 { vec![1.0, 0.0, 0.0, 2.0] } else { vec![0.0; 4] } };
-        let single = compress((0..50).collect(), (0..50).map(one).collect(), &gather, (&params, 1.0));
+        let single = compress((0..50).collect(), (0..50).map(one).collect(), 4, (&params, 1.0));
         assert_eq!(single[0].rank, 1);
         assert!(single[0].projection.iter().chain(&single[0].reconstruction).all(|v| v.is_finite()));
         let none = |_| Row { probes: vec![], values: vec![] };
-        assert_eq!(compress(vec![3, 4], (0..2).map(none).collect(), &gather, (&params, 1.0))[0].receivers, [3, 4]);
+        assert_eq!(compress(vec![3, 4], (0..2).map(none).collect(), 4, (&params, 1.0))[0].receivers, [3, 4]);
     }
 }

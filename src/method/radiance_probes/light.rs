@@ -4,6 +4,8 @@ use super::harmonics::cosine_factor;
 use super::operator::Transport;
 use super::params::RadianceProbeParams;
 use super::transport::{Kept, first_four};
+use super::volume::{NUMBERS, Volume, irradiance};
+use crate::Result;
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::lightmap::LightMap;
@@ -11,6 +13,7 @@ use crate::lightmap::lookup::sides;
 use crate::lightmap::receivers::{POINTS, Receiver, spread};
 use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
+use crate::method::Setup;
 use crate::scene::Animation;
 use crate::transport::path::{PathParams, transmitted_irradiance};
 use crate::transport::{Sampler, World};
@@ -20,11 +23,14 @@ use std::borrow::Cow;
 use std::f32::consts::FRAC_1_PI;
 
 /// Light at the receivers.
+#[derive(Debug, Clone)]
 pub struct Light {
     /// E_T straight from emitters.
     pub direct: Vec<Rgb>,
     /// What comes by way of the probes, as many numbers a receiver as it keeps.
     pub indirect: Vec<Rgb>,
+    /// The same in free space; empty without a volume.
+    pub volume: Vec<Rgb>,
 }
 
 /// E_T that emitters send to each receiver. The random numbers of a receiver are the same in every frame, so that light which stays where it
@@ -66,6 +72,12 @@ pub struct Lighting {
 }
 
 impl Lighting {
+    /// Of a setup's frames.
+    pub fn load(setup: &Setup) -> Result<Self> {
+        let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
+        Ok(Self::new(setup.world, transport, setup.animation))
+    }
+
     /// In `world`, the scene's own, whose materials may change from frame to frame.
     pub fn new(world: &World, transport: Transport, animation: Option<&Animation>) -> Self {
         let changed = animation.map_or_else(Vec::new, Animation::changed_materials);
@@ -96,13 +108,13 @@ impl Lighting {
         !self.changing.is_empty()
     }
 
-    /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2). `before`: indirect light that bounces go on
-    /// from, of the frame before (§4.2); none for darkness.
+    /// All light of a frame, whose world this is; passes are timed as the paper does (Table 2). `before`: light that bounces go on from, of
+    /// the frame before (§4.2); none for darkness.
     pub fn light(
         &self,
         world: &World,
         params: &RadianceProbeParams,
-        (before, seed): (Option<Vec<Rgb>>, u32),
+        (before, seed): (Option<Light>, u32),
         clock: &mut Clock,
     ) -> Light {
         let transport = &self.transport;
@@ -110,20 +122,30 @@ impl Lighting {
         let direct = direct(world, &transport.receivers, params.map_samples, seed);
         clock.lap("scene relight");
         let (hits, blockers) = transport.hits_in(world);
-        let blocking = blocking(world, &blockers, seed);
+        let volume = transport.volume.as_ref();
+        let blockers = Blocker::all(world, &blockers, volume, seed);
         let rows = transport.params.receiver.rows();
-        let mut indirect = before.unwrap_or_else(|| vec![Rgb::ZERO; direct.len() * rows]);
+        let dark = || Light {
+            direct: Vec::new(),
+            indirect: vec![Rgb::ZERO; direct.len() * rows],
+            volume: vec![Rgb::ZERO; volume.map_or(0, |v| v.cells.len() * NUMBERS)],
+        };
+        let mut light = before.unwrap_or_else(dark);
         for _ in 0..params.bounces {
-            let mut radiance = radiance(&direct, &self.irradiance(&indirect), &reflectances);
-            radiance.extend(&blocking);
+            let mut radiance = radiance(&direct, &self.irradiance(&light.indirect), &reflectances);
+            radiance.par_extend(blockers.par_iter().map(|blocker| blocker.radiance(&light.volume)));
             let lambda = transport.probe_radiance(&hits, &radiance);
             clock.lap("probe relight");
             let spaces = transport.project(&lambda);
             clock.lap("cluster projection");
-            indirect = transport.reconstruct(&spaces);
+            light.indirect = transport.reconstruct(&spaces);
             clock.lap("receivers");
+            if let Some(volume) = volume {
+                light.volume = volume.receive(&lambda, transport.params.terms());
+                clock.lap("volume");
+            }
         }
-        Light { direct, indirect }
+        Light { direct, ..light }
     }
 
     /// Irradiance of what receivers keep: of sh1, by the two factors of Ramamoorthi and Hanrahan 2001.
@@ -145,16 +167,33 @@ impl Lighting {
     }
 }
 
-/// Diffuse radiance that shapes in the way of relight rays send back along them: of direct light, by one sample. *Ours*: in the paper they are
-/// black.
-fn blocking(world: &World, blockers: &[(Surface, Vec3)], seed: u32) -> Vec<Rgb> {
-    let of = |(i, (surface, wo)): (usize, &(Surface, Vec3))| {
-        let wi = surface.frame.to_local(*wo);
-        let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(surface, wi);
-        let mut sampler = Sampler::new(hash_words(&[seed, i as u32, 2]), 0);
-        out * transmitted_irradiance(world, surface, wi.z < 0.0, None, &PathParams::DIRECT, &mut sampler) * FRAC_1_PI
-    };
-    blockers.par_iter().enumerate().with_min_len(64).map(of).collect()
+/// A surface that a frame adds in the way of a relight ray. *Ours*: it sends diffuse light back along the ray; in the paper it is black.
+struct Blocker {
+    /// `diffuse_out` over π.
+    out: Rgb,
+    /// E_T straight from emitters, by one sample.
+    direct: Rgb,
+    /// How it takes E_T from a volume.
+    taps: Vec<(u32, [f32; NUMBERS])>,
+}
+
+impl Blocker {
+    /// Of surfaces and the directions towards the probes.
+    fn all(world: &World, surfaces: &[(Surface, Vec3)], volume: Option<&Volume>, seed: u32) -> Vec<Self> {
+        let of = |(i, (surface, wo)): (usize, &(Surface, Vec3))| {
+            let wi = surface.frame.to_local(*wo);
+            let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(surface, wi) * FRAC_1_PI;
+            let mut sampler = Sampler::new(hash_words(&[seed, i as u32, 2]), 0);
+            let direct = transmitted_irradiance(world, surface, wi.z < 0.0, None, &PathParams::DIRECT, &mut sampler);
+            Self { out, direct, taps: volume.map_or_else(Vec::new, |v| v.taps(world, surface, *wo)) }
+        };
+        surfaces.par_iter().enumerate().with_min_len(64).map(of).collect()
+    }
+
+    /// What it sends to the probe.
+    fn radiance(&self, volume: &[Rgb]) -> Rgb {
+        self.out * (self.direct + irradiance(&self.taps, volume))
+    }
 }
 
 /// Diffuse radiance that receivers send out.

@@ -13,7 +13,9 @@ pub mod frame_map;
 pub mod gpu;
 pub mod harmonics;
 pub mod inspect;
+pub mod interpolate;
 pub mod light;
+pub mod lit;
 pub mod operator;
 pub mod params;
 pub mod relight;
@@ -25,5 +27,6 @@ pub mod store;
 #[cfg(test)]
 mod tests;
 pub mod transport;
+pub mod volume;
 
 pub use row::METHOD;

@@ -3,6 +3,8 @@
 use super::compress::Cluster;
 use super::params::TransportParams;
 use super::relight::RelightRays;
+use super::seen::NO_RECEIVER;
+use super::volume::Volume;
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::lightmap::Atlas;
@@ -35,6 +37,8 @@ pub struct Transport {
     pub hits: Vec<u32>,
     /// The receivers' rows.
     pub clusters: Vec<Cluster>,
+    /// Receivers in free space.
+    pub volume: Option<Volume>,
 }
 
 impl Transport {
@@ -44,20 +48,27 @@ impl Transport {
     }
 
     /// What relight rays meet in a frame's world (§5.1), and the surfaces of shapes that it adds which block some of them: a ray that meets the
-    /// k-th of these has the number of receivers and k.
+    /// k-th of these has the number of receivers and k. *Ours*: a probe that such a shape swallows sees what it saw without.
     pub fn hits_in(&self, world: &World) -> (Cow<'_, [u32]>, Vec<(Surface, Vec3)>) {
         if !world.has_added() {
             return (Cow::Borrowed(&self.hits), Vec::new());
         }
         let rays = self.rays.directions.len();
-        let blocker = |(i, &hit): (usize, &u32)| {
-            let receiver = self.receivers.get(hit as usize)?;
-            let (p, to) = (self.probes[i / rays], receiver.surface(world, 0).p);
+        let blocker = |p: Vec3, hit: u32| {
+            let to = self.receivers.get(hit as usize)?.surface(world, 0).p;
             let d = (to - p).try_normalize()?;
             let ray = Ray { t_max: p.distance(to), ..Ray::new(p, d) };
             if world.occluded_by_added(&ray) { Some((world.intersect(&ray)?, -d)) } else { None }
         };
-        let all: Vec<Option<(Surface, Vec3)>> = self.hits.par_iter().enumerate().with_min_len(rays).map(blocker).collect();
+        let of_probe = |(hits, &p): (&[u32], &Vec3)| -> Vec<Option<(Surface, Vec3)>> {
+            let found: Vec<_> = hits.iter().map(|&hit| blocker(p, hit)).collect();
+            let is_swallowed = hits.iter().zip(&found).all(|(&hit, found)| match found {
+                Some((surface, wo)) => surface.ng.dot(*wo) < 0.0,
+                None => hit == NO_RECEIVER,
+            });
+            if is_swallowed { vec![None; found.len()] } else { found }
+        };
+        let all: Vec<_> = self.hits.par_chunks(rays).zip(&self.probes).flat_map_iter(of_probe).collect();
         let (mut hits, mut blockers) = (self.hits.clone(), Vec::new());
         for (hit, blocker) in hits.iter_mut().zip(all) {
             if let Some(blocker) = blocker {
@@ -75,33 +86,46 @@ impl Transport {
 
     /// Cluster projection: the light of each cluster's own few dimensions.
     pub fn project(&self, lambda: &[Rgb]) -> Vec<Vec<Rgb>> {
-        let terms = self.params.terms();
-        self.clusters.par_iter().map(|cluster| cluster.project(lambda, terms)).collect()
+        project(&self.clusters, lambda, self.params.terms())
     }
 
     /// Receiver reconstruction, from what [`Self::project`] gave: `receiver.rows()` numbers each.
     pub fn reconstruct(&self, spaces: &[Vec<Rgb>]) -> Vec<Rgb> {
-        let rows = self.params.receiver.rows();
-        let clusters = self.clusters.par_iter().zip(spaces);
-        let all: Vec<Vec<Rgb>> = clusters.map(|(cluster, space)| cluster.reconstruct(space, rows)).collect();
-        let mut light = vec![Rgb::ZERO; self.receivers.len() * rows];
-        for (cluster, values) in self.clusters.iter().zip(&all) {
-            for (&r, values) in cluster.receivers.iter().zip(values.chunks_exact(rows)) {
-                light[r as usize * rows..][..rows].copy_from_slice(values);
-            }
-        }
-        light
+        reconstruct(&self.clusters, spaces, self.params.receiver.rows(), self.receivers.len())
     }
 
     /// Bytes of receivers, relight rays and the operator.
     pub fn bytes(&self) -> usize {
-        let halves = |c: &Cluster| 2 * (c.projection.len() + c.reconstruction.len()) + 4 * (c.receivers.len() + c.probes.len());
-        let clusters: usize = self.clusters.iter().map(halves).sum();
-        clusters + 4 * self.hits.len() + self.receivers.len() * size_of::<Receiver>()
+        let clusters: usize = self.clusters.iter().map(Cluster::bytes).sum();
+        let volume = self.volume.as_ref().map_or(0, Volume::bytes);
+        clusters + 4 * self.hits.len() + self.receivers.len() * size_of::<Receiver>() + volume
     }
 }
 
+/// The light of the own few dimensions of each of `clusters`; `terms`: harmonics of a probe.
+pub fn project(clusters: &[Cluster], lambda: &[Rgb], terms: usize) -> Vec<Vec<Rgb>> {
+    clusters.par_iter().map(|cluster| cluster.project(lambda, terms)).collect()
+}
+
+/// The light of all `count` receivers of `clusters`, `numbers` each, from that of their spaces.
+pub fn reconstruct(clusters: &[Cluster], spaces: &[Vec<Rgb>], numbers: usize, count: usize) -> Vec<Rgb> {
+    let of = |(cluster, space): (&Cluster, &Vec<Rgb>)| cluster.reconstruct(space, numbers);
+    let all: Vec<Vec<Rgb>> = clusters.par_iter().zip(spaces).map(of).collect();
+    let mut light = vec![Rgb::ZERO; count * numbers];
+    for (cluster, values) in clusters.iter().zip(&all) {
+        for (&r, values) in cluster.receivers.iter().zip(values.chunks_exact(numbers)) {
+            light[r as usize * numbers..][..numbers].copy_from_slice(values);
+        }
+    }
+    light
+}
+
 impl Cluster {
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        2 * (self.projection.len() + self.reconstruction.len()) + 4 * (self.receivers.len() + self.probes.len())
+    }
+
     /// Σ Vᵀ λ, under `lambda` of all probes.
     fn project(&self, lambda: &[Rgb], terms: usize) -> Vec<Rgb> {
         // A channel after the other, so that sums run along them.

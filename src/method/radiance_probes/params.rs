@@ -2,7 +2,8 @@
 
 use super::compress::CompressParams;
 use super::harmonics::{MAX_ORDER, terms};
-use super::transport::{Gather, Interpolation, Kept};
+use super::interpolate::Interpolation;
+use super::transport::{Gather, Kept};
 use crate::Result;
 use crate::base::named::{Parameters, within};
 use crate::lightmap::AtlasParams;
@@ -27,6 +28,9 @@ pub struct TransportParams {
     pub relight_rays: u32,
     /// Radius of a probe's support, metres; by default what lets ten of them cover a receiver on average.
     pub radius: Option<f32>,
+    /// Between receivers in free space, metres; without any by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume: Option<f32>,
     /// How the operator is compressed.
     pub compress: CompressParams,
 }
@@ -42,6 +46,7 @@ impl Default for TransportParams {
             rays: 512,
             relight_rays: 8000,
             radius: None,
+            volume: None,
             compress: CompressParams::default(),
         }
     }
@@ -67,6 +72,9 @@ impl Parameters for TransportParams {
         within("--texels", self.atlas.budget, 1..=1 << 26)?;
         if let Some(radius) = self.radius {
             within("--radius", radius, f32::MIN_POSITIVE..=1e6)?;
+        }
+        if let Some(spacing) = self.volume {
+            within("--volume", spacing, 1e-4..=1e6)?;
         }
         within("--error", self.compress.error, 0.0..=1.0)?;
         within("--most-terms", self.compress.most_terms, 1..=1024)?;

@@ -1,19 +1,16 @@
 //! Radiance probes in the table of methods.
 
-use super::frame_map::FrameMap;
 use super::gpu::RadianceProbesOnGpu;
-use super::light::{Light, Lighting};
-use super::operator::Transport;
+use super::light::Lighting;
+use super::lit::Lit;
 use super::params::RadianceProbeParams;
-use super::shade::{Indirect, Shading};
 use super::transport::Kept;
 use crate::base::clock::Clock;
-use crate::base::math::Rgb;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::gpu::Gpu;
+use crate::method::diffuse::DiffuseLight;
 use crate::method::{Frame, Method, Need, Options, Probes, Reads, Renderer, Setup, as_given};
-use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
 use crate::{Error, Result};
@@ -35,6 +32,7 @@ pub const METHOD: Method = Method {
     for_scene: as_given,
     cpu,
     gpu: Some(gpu),
+    diffuse: Some(diffuse),
 };
 
 fn parameters(options: &Options) -> Result<Value> {
@@ -45,68 +43,32 @@ fn parameters(options: &Options) -> Result<Value> {
 
 struct OnCpu<'a> {
     setup: Setup<'a>,
-    lighting: Lighting,
-    map: FrameMap,
-    params: RadianceProbeParams,
-    /// The last frame that was lit, and its indirect light, where the next goes on from that.
-    last: Option<(u32, Vec<Rgb>)>,
+    lit: Lit<'a>,
 }
 
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let lighting = lighting(setup)?;
-    let map = FrameMap::new(&setup.world.scene.geometry, &lighting.transport);
-    Ok(Box::new(OnCpu { setup: *setup, lighting, map, params: setup.parameters()?, last: None }))
+    let params: RadianceProbeParams = setup.parameters()?;
+    Ok(Box::new(OnCpu { setup: *setup, lit: Lit::new(setup, params.gloss_samples > 0)? }))
 }
 
-impl OnCpu<'_> {
-    /// The light of a frame; with feedback, that of all frames before it comes first, whichever of them are asked for.
-    fn light(&mut self, view: &View, world: &World, clock: &mut Clock) -> Light {
-        let seed = self.setup.seed;
-        if !self.params.feedback {
-            return self.lighting.light(world, &self.params, (None, seed), clock);
-        }
-        let (from, mut before) = match self.last.take() {
-            Some((frame, light)) if frame < view.frame => (frame + 1, Some(light)),
-            _ => (0, None),
-        };
-        for frame in from..view.frame {
-            let earlier = View { frame, camera: view.camera.clone() };
-            let of_frame = self.setup.world_at(&earlier);
-            let world = of_frame.as_ref().unwrap_or(self.setup.world);
-            before = Some(self.lighting.light(world, &self.params, (before, seed), &mut Clock::start()).indirect);
-        }
-        clock.restart();
-        let light = self.lighting.light(world, &self.params, (before, seed), clock);
-        self.last = Some((view.frame, light.indirect.clone()));
-        light
-    }
+fn diffuse<'a>(setup: &Setup<'a>) -> Result<Box<dyn DiffuseLight + 'a>> {
+    Ok(Box::new(Lit::new(setup, true)?))
 }
 
 impl Renderer for OnCpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
-        let (mut clock, setup) = (Clock::start(), self.setup);
-        let of_frame = setup.world_at(view);
+        let mut clock = Clock::start();
+        let of_frame = self.setup.world_at(view);
         if of_frame.is_some() {
             clock.lap("world");
         }
-        let world = of_frame.as_ref().unwrap_or(setup.world);
-        let light = self.light(view, world, &mut clock);
-        let indirect = Indirect::new(&self.map, self.lighting.transport.params.receiver, &light);
-        let all = (self.params.gloss_samples > 0).then(|| self.map.lit(&self.lighting.total(&light)));
-        clock.lap("light map");
-        let baseline = Baseline::new(world, None, self.params.supersample);
+        let world = of_frame.as_ref().unwrap_or(self.setup.world);
+        self.lit.relight(view, world, &mut clock);
+        let baseline = Baseline::new(world, None, self.lit.params.supersample);
         let g = baseline.gbuffer(&view.camera, &mut clock);
-        let shading = Shading {
-            world,
-            indirect: &indirect,
-            total: all.as_ref(),
-            params: &self.params,
-            seed: setup.seed,
-            frame: view.frame,
-        };
-        let diffuse = shading.diffuse(&g);
+        let diffuse = self.lit.layer(world, &g);
         clock.lap("diffuse");
-        let glossy = shading.glossy(&g);
+        let glossy = self.lit.shading(world).map_or_else(Vec::new, |shading| shading.glossy(&g));
         clock.lap("glossy");
         let layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
         progress.advance(view.camera.size[1].into());
@@ -114,7 +76,7 @@ impl Renderer for OnCpu<'_> {
     }
 
     fn probe_bytes(&self) -> [u64; 2] {
-        [self.lighting.transport.bytes() as u64, 0]
+        [self.lit.bytes() as u64, 0]
     }
 }
 
@@ -123,25 +85,22 @@ struct OnGpu<'a> {
     /// Where lights or colours change.
     lighting: Option<Lighting>,
     probes: RadianceProbesOnGpu,
-}
-
-/// The lighting of a setup's frames.
-fn lighting(setup: &Setup) -> Result<Lighting> {
-    let transport = Transport::load(&setup.required_probes()?, &setup.world.scene)?;
-    Ok(Lighting::new(setup.world, transport, setup.animation))
+    /// Whether light goes on from frame to frame.
+    feedback: bool,
+    /// The frame that was lit last.
+    last: Option<u32>,
 }
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let lighting = lighting(setup)?;
+    let lighting = Lighting::load(setup)?;
     if lighting.transport.params.receiver != Kept::Irradiance {
         let message =
             "the GPU's radiance probes have receivers of irradiance alone (bake-transport --receiver); use --device cpu";
         return Err(Error::Request(message.into()));
     }
     let params: RadianceProbeParams = setup.parameters()?;
-    if params.gloss_samples > 0 || params.feedback {
-        let message = "the GPU's radiance probes have neither gloss_samples nor feedback; use --device cpu";
-        return Err(Error::Request(message.into()));
+    if params.gloss_samples > 0 {
+        return Err(Error::Request("the GPU's radiance probes have no gloss_samples; use --device cpu".into()));
     }
     let piece = gpu.adapter.max_binding;
     let mut probes = RadianceProbesOnGpu::new(gpu, setup.world, &lighting, &params, piece)?;
@@ -149,17 +108,36 @@ fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     if let Some(world) = setup.views.first().and_then(|view| setup.world_at(view)) {
         probes.relight(&world, &lighting)?;
     }
-    Ok(Box::new(OnGpu { setup: *setup, lighting: setup.animation.map(|_| lighting), probes }))
+    let lighting = setup.animation.map(|_| lighting);
+    Ok(Box::new(OnGpu { setup: *setup, lighting, probes, feedback: params.feedback, last: None }))
+}
+
+impl OnGpu<'_> {
+    fn relight(&mut self, view: &View) -> Result<()> {
+        match self.setup.world_at(view).zip(self.lighting.as_ref()) {
+            Some((world, lighting)) => self.probes.relight(&world, lighting),
+            None => Ok(()),
+        }
+    }
 }
 
 impl Renderer for OnGpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
+        let seed = self.setup.seed;
+        if self.feedback {
+            let first = self.last.filter(|&last| last < view.frame).map_or(0, |last| last + 1);
+            for frame in first..view.frame {
+                self.relight(&View { frame, camera: view.camera.clone() })?;
+                self.probes.light(seed, frame > 0)?;
+            }
+        }
+        self.last = Some(view.frame);
         let mut clock = Clock::start();
-        if let Some((world, lighting)) = self.setup.world_at(view).zip(self.lighting.as_ref()) {
-            self.probes.relight(&world, lighting)?;
+        self.relight(view)?;
+        if self.lighting.is_some() {
             clock.lap("world");
         }
-        let frame = self.probes.frame(&view.camera, self.setup.seed, view.frame)?;
+        let frame = self.probes.frame(&view.camera, [seed, view.frame], self.feedback && view.frame > 0)?;
         progress.advance(view.camera.size[1].into());
         Ok(Frame::of(frame.layers, [clock.laps, frame.passes].concat()))
     }

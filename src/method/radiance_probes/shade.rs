@@ -4,6 +4,7 @@ use super::frame_map::FrameMap;
 use super::light::Light;
 use super::params::RadianceProbeParams;
 use super::transport::{Kept, first_four};
+use super::volume::{Volume, irradiance};
 use crate::base::math::{Basis, Rgb, hash_words, luminance};
 use crate::lightmap::LightMap;
 use crate::material::Surface;
@@ -51,6 +52,8 @@ pub struct Shading<'a> {
     pub indirect: &'a Indirect,
     /// All light of the receivers, where glossy paths read it.
     pub total: Option<&'a LightMap>,
+    /// Receivers in free space and their light.
+    pub volume: Option<(&'a Volume, &'a [Rgb])>,
     /// How.
     pub params: &'a RadianceProbeParams,
     /// Seed of the random numbers.
@@ -68,6 +71,7 @@ impl Shading<'_> {
             let straight = direct(self.world, p, query, self.params.direct_samples, stream);
             straight
                 + match self.indirect {
+                    _ if self.world.is_added(&p.surface) => self.of_added(&p.surface, p.wo),
                     Indirect::Irradiance(map) => map.diffuse_radiance(scene, &p.surface, p.wo),
                     Indirect::Radiance(maps) => self.taken_in(p, &looked_up(maps, p)),
                 }
@@ -90,10 +94,36 @@ impl Shading<'_> {
     }
 
     fn along_lobes(&self, p: &Pixel, total: &LightMap, stream: u32) -> Rgb {
-        let known = |s: &Surface, wo: Vec3| total.diffuse_radiance(&self.world.scene, s, wo);
+        let known = |s: &Surface, wo: Vec3| self.read(total, s, wo);
         let path = PathParams::default();
         let sample = |i| scattered(self.world, &p.surface, p.wo, GLOSSY, Some(&known), &path, &mut Sampler::new(stream, i));
         (0..self.params.gloss_samples).map(sample).sum::<Rgb>() / self.params.gloss_samples as f32
+    }
+
+    /// Diffuse radiance of a surface towards `wo`, direct light included; none where the light of receivers is not at hand.
+    pub fn radiance(&self, surface: &Surface, wo: Vec3) -> Rgb {
+        self.total.map_or(Rgb::ZERO, |total| self.read(total, surface, wo))
+    }
+
+    /// The same by the receivers' light; a shape that the frame adds has direct light by one sample, and the volume's.
+    fn read(&self, total: &LightMap, surface: &Surface, wo: Vec3) -> Rgb {
+        if !self.world.is_added(surface) {
+            return total.diffuse_radiance(&self.world.scene, surface, wo);
+        }
+        let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
+        let stream = hash_words(&[self.seed, surface.triangle, surface.t.to_bits()]);
+        let mut sampler = Sampler::new(stream, 0);
+        scattered(self.world, surface, wo, query, None, &PathParams::DIRECT, &mut sampler) + self.of_added(surface, wo)
+    }
+
+    /// What the diffuse lobe of a shape that the frame adds sends on of light by way of the probes.
+    fn of_added(&self, surface: &Surface, wo: Vec3) -> Rgb {
+        let Some((volume, light)) = self.volume else { return Rgb::ZERO };
+        let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+        match bsdf.diffuse_out(surface, surface.frame.to_local(wo)) {
+            Rgb::ZERO => Rgb::ZERO,
+            out => out * irradiance(&volume.taps(self.world, surface, wo), light) * FRAC_1_PI,
+        }
     }
 
     /// Diffuse reflection of light of first order. *Ours*: by directions in place of the two factors of Ramamoorthi and Hanrahan 2001, so that

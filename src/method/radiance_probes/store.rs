@@ -1,11 +1,13 @@
 //! Folders of transport. `receivers.exr` has the receivers, `relight.exr` the receiver that each relight ray meets (a row a probe), and
-//! `NNNN.exr` the clusters of a group of receivers. These are tables, not pictures: entry `i` is pixel `i` in row order. `set.json` comes last.
+//! `NNNN.exr` the clusters of a group of receivers; with receivers in free space, `volume.exr` has their numbers in its grid, and their groups
+//! come after those of texels. These are tables, not pictures: entry `i` is pixel `i` in row order. `set.json` comes last.
 
 use super::compress::Cluster;
 use super::operator::Transport;
 use super::params::TransportParams;
 use super::relight::RelightRays;
 use super::seen::NO_RECEIVER;
+use super::volume::{Grid, NUMBERS, Volume};
 use crate::io::provenance::hash_file;
 use crate::io::{ExrImage, Provenance};
 use crate::lightmap::bake::atlas_of;
@@ -36,16 +38,30 @@ pub struct TransportSet {
     pub radius: f32,
     /// Number of receivers.
     pub receivers: usize,
-    /// Content hashes of `receivers.exr`, `relight.exr` and each group's file.
+    /// Receivers in free space.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume: Option<VolumeSet>,
+    /// Content hashes of `receivers.exr`, `relight.exr`, `volume.exr` where there is one, and each group's file.
     pub files: Vec<String>,
     /// Where it came from: the same in every file.
     pub provenance: Provenance,
 }
 
-/// All files of a folder of so many groups, in the order of [`TransportSet::files`].
-pub fn files(folder: &Path, groups: usize) -> Vec<PathBuf> {
-    let named = ["receivers.exr", "relight.exr"].map(|name| folder.join(name));
-    named.into_iter().chain((0..groups).map(|i| numbered(folder, i))).collect()
+/// What `set.json` says of receivers in free space.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct VolumeSet {
+    /// Where they lie.
+    pub grid: Grid,
+    /// How many of the grid's points they are.
+    pub points: usize,
+    /// Files of their clusters, the last ones.
+    pub groups: usize,
+}
+
+/// Files that all groups share; `volume.exr` where there are receivers in free space.
+pub fn shared_files(folder: &Path, has_volume: bool) -> Vec<PathBuf> {
+    let names = ["receivers.exr", "relight.exr", "volume.exr"];
+    names[..if has_volume { 3 } else { 2 }].iter().map(|name| folder.join(name)).collect()
 }
 
 /// Where the probes stand that take part.
@@ -62,16 +78,28 @@ impl TransportSet {
         let path = ProbeSet::path(folder);
         let set = read_set_of::<Self>(folder, Self::STAGE)?;
         let set = set.ok_or_else(|| Error::input(&path, "is not of transport: expected a folder that bake-transport wrote"))?;
-        if !(set.radius > 0.0 && set.radius.is_finite() && set.files.len() >= 2) {
+        let grid = set.volume.map(|v| v.grid);
+        let is_grid = |g: Grid| g.low.is_finite() && g.spacing > 0.0 && g.counts.iter().all(|n| (1..=1 << 22).contains(n));
+        let groups = set.volume.map_or(0, |v| v.groups);
+        let has_files = set.files.len() >= shared_files(folder, grid.is_some()).len() + groups;
+        if !(set.radius > 0.0 && set.radius.is_finite() && has_files && grid.is_none_or(is_grid)) {
             return Err(Error::input(&path, "holds no radius above 0 or no files: run bake-transport again"));
         }
         crate::base::named::Parameters::validate(&set.bake)?;
         Ok(set)
     }
 
-    /// Hashes of all files as they are.
-    pub fn hashes(folder: &Path, groups: usize) -> Result<Vec<String>> {
-        files(folder, groups).iter().map(|file| hash_file(file)).collect()
+    /// All files of the folder, in the order of [`Self::files`].
+    pub fn paths(&self, folder: &Path) -> Vec<PathBuf> {
+        let shared = shared_files(folder, self.volume.is_some());
+        let groups = self.files.len().saturating_sub(shared.len());
+        shared.into_iter().chain((0..groups).map(|i| numbered(folder, i))).collect()
+    }
+
+    /// Hashes of shared files and those of so many groups as they are.
+    pub fn hashes(folder: &Path, has_volume: bool, groups: usize) -> Result<Vec<String>> {
+        let all = shared_files(folder, has_volume).into_iter().chain((0..groups).map(|i| numbered(folder, i)));
+        all.map(|file| hash_file(&file)).collect()
     }
 }
 
@@ -80,17 +108,31 @@ impl Transport {
     pub fn load(folder: &Path, scene: &Scene) -> Result<Self> {
         let set = TransportSet::read(folder)?;
         set.provenance.check_scene(&ProbeSet::path(folder), &scene.hash)?;
-        let files = files(folder, set.files.len() - 2);
+        let files = set.paths(folder);
         let probes = positions(&set.places);
         let read = |path: &PathBuf| read_member(path, None, &set.provenance);
         let atlas = atlas_of(scene, &set.bake.atlas)?;
         let [triangles, pixels] = [scene.geometry.triangles.len() as u32, atlas.size[0] * atlas.size[1]];
         let receivers = decode_receivers(&files[0], &read(&files[0])?, set.receivers, [triangles, pixels])?;
         let hits = relight(&files[1], &read(&files[1])?, probes.len() * set.bake.relight_rays as usize, receivers.len())?;
-        let clusters = |path: &PathBuf| decode_clusters(path, &read(path)?, &set.bake, [receivers.len(), probes.len()]);
-        let clusters: Vec<Vec<Cluster>> = files[2..].par_iter().map(clusters).collect::<Result<_>>()?;
-        let (clusters, rays) = (clusters.concat(), RelightRays::new(set.bake.relight_rays, set.bake.sh_order));
-        Ok(Self { params: set.bake, probes, radius: set.radius, atlas, receivers, rays, hits, clusters })
+        let of = |files: &[PathBuf], numbers: usize, count: usize| -> Result<Vec<Cluster>> {
+            let shape = Shape { terms: set.bake.terms(), numbers, receivers: count, probes: probes.len() };
+            let clusters = |path: &PathBuf| decode_clusters(path, &read(path)?, &shape);
+            let clusters: Vec<Vec<Cluster>> = files.par_iter().map(clusters).collect::<Result<_>>()?;
+            Ok(clusters.concat())
+        };
+        let groups = &files[shared_files(folder, set.volume.is_some()).len()..];
+        let (texels, space) = groups.split_at(groups.len() - set.volume.map_or(0, |v| v.groups));
+        let clusters = of(texels, set.bake.receiver.rows(), receivers.len())?;
+        let volume = match set.volume {
+            None => None,
+            Some(VolumeSet { grid, points, .. }) => {
+                let cells = decode_cells(&files[2], &read(&files[2])?, &grid, points)?;
+                Some(Volume { grid, cells, clusters: of(space, NUMBERS, points)? })
+            }
+        };
+        let rays = RelightRays::new(set.bake.relight_rays, set.bake.sh_order);
+        Ok(Self { params: set.bake, probes, radius: set.radius, atlas, receivers, rays, hits, clusters, volume })
     }
 }
 
@@ -163,6 +205,30 @@ fn relight(path: &Path, image: &ExrImage, count: usize, receivers: usize) -> Res
     Ok(hits)
 }
 
+/// The table of receivers in free space.
+pub fn encode_cells(cells: &[u32], provenance: &Provenance) -> ExrImage {
+    let image = table(cells.len());
+    let column = padded(cells.to_vec(), &image);
+    image.with_u32("cell", column).with_provenance(provenance.clone())
+}
+
+fn decode_cells(path: &Path, image: &ExrImage, grid: &Grid, count: usize) -> Result<Vec<u32>> {
+    let cells = image.u32(path, "cell")?;
+    let is_right = |cells: &[u32]| cells.is_sorted_by(|a, b| a < b) && cells.last().is_none_or(|&c| (c as usize) < grid.count());
+    match cells.get(..count).filter(|cells| is_right(cells)) {
+        Some(cells) => Ok(cells.to_vec()),
+        None => Err(Error::input(path, format!("expected {count} points of the grid, in order"))),
+    }
+}
+
+/// What the clusters of a file are of: harmonics of a probe, numbers of a receiver, and how many receivers and probes there are.
+struct Shape {
+    terms: usize,
+    numbers: usize,
+    receivers: usize,
+    probes: usize,
+}
+
 /// A group's clusters: `index` has their number, then of each its numbers of receivers and probes, its rank, and the lists; `value` has
 /// projection and reconstruction of each.
 pub fn encode_clusters(clusters: &[Cluster], provenance: &Provenance) -> ExrImage {
@@ -178,12 +244,7 @@ pub fn encode_clusters(clusters: &[Cluster], provenance: &Provenance) -> ExrImag
     image.with_u32("index", index).with_f16("value", values).with_provenance(provenance.clone())
 }
 
-fn decode_clusters(
-    path: &Path,
-    image: &ExrImage,
-    params: &TransportParams,
-    [receivers, probes]: [usize; 2],
-) -> Result<Vec<Cluster>> {
+fn decode_clusters(path: &Path, image: &ExrImage, shape: &Shape) -> Result<Vec<Cluster>> {
     let (index, values) = (image.u32(path, "index")?, image.f32(path, "value")?);
     let bad = || Error::input(path, "its tables do not fit: run bake-transport again");
     let (mut index, mut values) = (index.as_slice(), values.as_slice());
@@ -202,10 +263,10 @@ fn decode_clusters(
         let numbers = word(3)?;
         let [r, p, rank] = [0, 1, 2].map(|k| numbers[k] as usize);
         let (list, of) = (word(r)?, word(p)?);
-        if list.iter().any(|&i| i as usize >= receivers) || of.iter().any(|&i| i as usize >= probes) {
+        if list.iter().any(|&i| i as usize >= shape.receivers) || of.iter().any(|&i| i as usize >= shape.probes) {
             return Err(bad());
         }
-        let (columns, rows) = (p * params.terms(), r * params.receiver.rows());
+        let (columns, rows) = (p * shape.terms, r * shape.numbers);
         let count = |n: usize| n.checked_mul(rank).ok_or_else(bad);
         let (projection, reconstruction) = (halves(count(columns)?)?, halves(count(rows)?)?);
         clusters.push(Cluster { receivers: list, probes: of, rank, projection, reconstruction });

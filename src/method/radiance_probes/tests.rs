@@ -1,14 +1,17 @@
 //! Light by way of probes against what is known of it, and against path tracing.
 
 use super::bake::Bake;
+use super::interpolate::Interpolation;
 use super::light::{Lighting, direct};
 use super::operator::Transport;
 use super::params::{RadianceProbeParams, TransportParams};
 use super::round_trip::norms;
-use super::transport::{Interpolation, sample};
+use super::transport::sample;
+use super::volume::irradiance;
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Silent;
+use crate::base::ray::Ray;
 use crate::exchange::{LoadOptions, load};
 use crate::lightmap::AtlasParams;
 use crate::transport::path::{PathParams, transmitted_irradiance};
@@ -68,6 +71,22 @@ fn surfaces_that_all_send_out_the_same_light_give_pi_times_that() {
         let lost = 1.0 - mean.x / PI;
         let most = if interpolation == Interpolation::Spatial { 0.005 } else { 0.06 };
         assert!((-0.005..most).contains(&lost), "{interpolation}: {lost}");
+    }
+}
+
+#[test]
+fn free_space_receives_what_all_surfaces_send_whichever_way_a_surface_faces() {
+    let world = world(ROOM);
+    let transport = bake(&world, grid(2), &TransportParams { volume: Some(0.7), ..params(3, Interpolation::Visible) });
+    let volume = transport.volume.as_ref().unwrap();
+    assert!(volume.cells.len() > 100 && volume.cells.len() < volume.grid.count(), "{}", volume.cells.len());
+    let lambda = transport.probe_radiance(&transport.hits, &vec![Rgb::new(1.0, 2.0, 0.5); transport.receivers.len()]);
+    let light = volume.receive(&lambda, transport.params.terms());
+    // Floor, ceiling and walls, and the block's faces.
+    for d in [Vec3::NEG_Y, Vec3::X, Vec3::Z, Vec3::NEG_Z, Vec3::new(-0.6, -0.64, -0.48)] {
+        let surface = world.intersect(&Ray::new(Vec3::new(0.4, 0.1, 0.3), d)).unwrap();
+        let e = irradiance(&volume.taps(&world, &surface, -d), &light);
+        assert!((e.x - PI).abs() < 0.06 * PI && (e.y / e.x - 2.0).abs() < 0.01, "{d}: {e}");
     }
 }
 

@@ -9,10 +9,12 @@ use crate::io::provenance::hash_file;
 use crate::lightmap::AtlasParams;
 use crate::method::radiance_probes::bake::Bake;
 use crate::method::radiance_probes::compress::CompressParams;
+use crate::method::radiance_probes::interpolate::Interpolation;
 use crate::method::radiance_probes::params::TransportParams;
-use crate::method::radiance_probes::seen::Ground;
-use crate::method::radiance_probes::store::{TransportSet, encode_clusters, encode_receivers, encode_relight, files, positions};
-use crate::method::radiance_probes::transport::{Interpolation, Kept};
+use crate::method::radiance_probes::store::{
+    TransportSet, VolumeSet, encode_cells, encode_clusters, encode_receivers, encode_relight, positions, shared_files,
+};
+use crate::method::radiance_probes::transport::Kept;
 use crate::plan::option::{stage, text};
 use crate::plan::{Context, Outcome};
 use crate::probe::places::Places;
@@ -50,6 +52,8 @@ stage! {
         "--relight-rays" relight_rays: Option<u32>,
         /// Radius of a probe's support, metres.
         "--radius" radius: Option<f32>,
+        /// Between receivers in free space, metres.
+        "--volume" volume: Option<f32>,
         /// Relative error of the compressed operator.
         "--error" error: Option<f32>,
         /// Most coefficients a receiver.
@@ -82,6 +86,7 @@ impl BakeTransport {
             rays: self.rays.unwrap_or(base.rays),
             relight_rays: self.relight_rays.unwrap_or(base.relight_rays),
             radius: self.radius.or(base.radius),
+            volume: self.volume,
             compress,
         };
         params.validate()?;
@@ -121,43 +126,51 @@ impl BakeTransport {
         };
         let seal = || self.seal(&bake, &places, &params, &provenance);
         let done = complete(&items, self.shard, &is_kept, make, seal)?;
-        Ok(self.outcome(&bake.ground, done, clock()))
+        Ok(self.outcome(&bake, done, clock()))
     }
 
     fn is_up_to_date(&self, provenance: &Provenance) -> bool {
         let Ok(set) = TransportSet::read(&self.output) else { return false };
-        let files = files(&self.output, set.files.len().saturating_sub(2));
-        set.provenance == *provenance && files.iter().zip(&set.files).all(|(file, hash)| is_sealed_as(hash, file, provenance))
+        set.provenance == *provenance
+            && set.paths(&self.output).iter().zip(&set.files).all(|(file, hash)| is_sealed_as(hash, file, provenance))
     }
 
     /// Writes what all groups share, and the set.
     fn seal(&self, bake: &Bake, places: &Places, params: &TransportParams, provenance: &Provenance) -> Result<()> {
         let ground = &bake.ground;
-        let [receivers, relight] = ["receivers.exr", "relight.exr"].map(|name| self.output.join(name));
-        encode_receivers(&ground.receivers.list, provenance).write(&receivers)?;
-        encode_relight(&bake.hits(), ground.probes.len(), provenance).write(&relight)?;
+        let volume = bake.volume();
+        let shared = shared_files(&self.output, volume.is_some());
+        encode_receivers(&ground.receivers.list, provenance).write(&shared[0])?;
+        encode_relight(&bake.hits(), ground.probes.len(), provenance).write(&shared[1])?;
+        if let Some(volume) = &volume {
+            encode_cells(&volume.cells, provenance).write(&shared[2])?;
+        }
         let set = TransportSet {
             bake: *params,
             places: places.clone(),
             radius: ground.radius,
             receivers: ground.receivers.list.len(),
-            files: TransportSet::hashes(&self.output, bake.groups())?,
+            volume: volume.as_ref().map(|v| VolumeSet { grid: v.grid, points: v.cells.len(), groups: bake.groups_in_space() }),
+            files: TransportSet::hashes(&self.output, volume.is_some(), bake.groups())?,
             provenance: provenance.clone(),
         };
         json::write(&ProbeSet::path(&self.output), &set)
     }
 
-    fn outcome(&self, ground: &Ground, done: Done, seconds: f64) -> Outcome {
+    fn outcome(&self, bake: &Bake, done: Done, seconds: f64) -> Outcome {
+        let ground = &bake.ground;
         let Done { made, kept, missing } = done;
         let rest = done.rest("");
         let (receivers, probes, radius) = (ground.receivers.list.len(), ground.probes.len(), ground.radius);
+        let points = bake.volume().map(|v| v.cells.len());
+        let in_space = points.map_or(String::new(), |n| format!(" and {n} in free space"));
         Outcome {
             summary: format!(
-                "{}: {receivers} receivers of {probes} probes that reach {radius:.2} m; {made} groups baked, {kept} kept, {seconds:.1} s{rest}",
+                "{}: {receivers} receivers{in_space} of {probes} probes that reach {radius:.2} m; {made} groups baked, {kept} kept, {seconds:.1} s{rest}",
                 self.output.display()
             ),
             figures: json!({
-                "receivers": receivers, "probes": probes, "radius": radius, "groups": made + kept + missing, "baked": made,
+                "receivers": receivers, "in_free_space": points, "probes": probes, "radius": radius, "groups": made + kept + missing, "baked": made,
                 "missing": missing, "seconds": seconds,
             }),
             ..Outcome::default()

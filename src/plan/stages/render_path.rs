@@ -6,6 +6,7 @@ use crate::gpu::camera;
 use crate::io::Provenance;
 use crate::io::provenance::hash_file;
 use crate::lightmap::LightMap;
+use crate::method::diffuse::Joined;
 use crate::method::glossy_probes::wanted::Served;
 use crate::method::glossy_probes::{self, GlossyProbeParams};
 use crate::method::{FilterChoice, LayerChoice, METHODS, Method, Need, Options, Renderer, Setup};
@@ -51,6 +52,12 @@ stage! {
         "--method" method: Option<String>,
         /// Baked probes.
         "--probes" probes: Option<PathBuf>,
+        /// The method whose diffuse light frames have.
+        "--diffuse" diffuse: Option<String>,
+        /// Its probes.
+        "--diffuse-probes" diffuse_probes: Option<PathBuf>,
+        /// Its parameters, by name.
+        "--diffuse-set" diffuse_set: Vec<String>,
         /// The light map.
         "--lightmap" lightmap: Option<PathBuf>,
         /// Curvatures of the scene.
@@ -124,10 +131,13 @@ impl RenderPath {
     }
 
     /// Options that not every method uses, and whether they are given.
-    fn given(&self) -> [(&'static str, bool); 17] {
+    fn given(&self) -> [(&'static str, bool); 20] {
         [
             ("lights", self.lights.is_some()),
             ("probes", self.probes.is_some()),
+            ("diffuse", self.diffuse.is_some()),
+            ("diffuse-probes", self.diffuse_probes.is_some()),
+            ("diffuse-set", !self.diffuse_set.is_empty()),
             ("lightmap", self.lightmap.is_some()),
             ("curvature", self.curvature.is_some()),
             ("supersample", self.supersample.is_some()),
@@ -149,7 +159,9 @@ impl RenderPath {
     /// Checks all options, and reads nothing.
     pub fn resolve(&self) -> Result<Resolved> {
         let method = self.method()?;
-        if let Some((option, _)) = self.given().into_iter().find(|(option, given)| *given && !method.uses(option)) {
+        // Another method's diffuse light follows lights, whatever the method's own does.
+        let uses = |option: &str| method.uses(option) || (option == "lights" && self.diffuse.is_some());
+        if let Some((option, _)) = self.given().into_iter().find(|(option, given)| *given && !uses(option)) {
             let others: Vec<&str> = METHODS.iter().filter(|m| m.uses(option)).map(|m| m.name).collect();
             let (name, why) = (method.name, why_not(method, option));
             return Err(Error::Request(format!("--{option}: --method {name} has no use for it{why}; {} has", others.join(", "))));
@@ -163,6 +175,7 @@ impl RenderPath {
                 return Err(Error::Request(format!("--method {} needs --{option}, written by {stage}", method.name)));
             }
         }
+        self.joined()?;
         let budgets = [self.budget_ms.is_some(), self.match_time.is_some(), self.spp.is_some(), self.samples.is_some()];
         if budgets.into_iter().filter(|given| *given).count() > 1 {
             return Err(Error::Request("--budget-ms, --match-time, --spp, --samples: expected one of them".into()));
@@ -181,6 +194,27 @@ impl RenderPath {
             set: self.set.clone(),
         };
         Ok(Resolved { method, parameters: (method.parameters)(&options)? })
+    }
+
+    /// Whose diffuse light frames have, where it is not the method's own.
+    fn joined(&self) -> Result<Option<Joined>> {
+        let Some(name) = &self.diffuse else {
+            let orphan = [("diffuse-probes", self.diffuse_probes.is_some()), ("diffuse-set", !self.diffuse_set.is_empty())];
+            return match orphan.into_iter().find(|(_, given)| *given) {
+                Some((option, _)) => Err(Error::Request(format!("--{option}: whose is missing: --diffuse METHOD"))),
+                None => Ok(None),
+            };
+        };
+        let method = Method::find(name).map_err(|e| Error::Request(format!("--diffuse: {e}")))?;
+        if method.diffuse.is_none() {
+            let others: Vec<&str> = METHODS.iter().filter(|m| m.diffuse.is_some()).map(|m| m.name).collect();
+            return Err(Error::Request(format!("--diffuse {name}: it has no light for others; {} has", others.join(", "))));
+        }
+        let stage = method.reads.probes.map_or("", |p| p.stage);
+        let missing = || Error::Request(format!("--diffuse {name} needs --diffuse-probes DIR, written by {stage}"));
+        let probes = self.diffuse_probes.clone().ok_or_else(missing)?;
+        let options = Options { set: self.diffuse_set.clone(), ..Options::default() };
+        Ok(Some(Joined { method, parameters: (method.parameters)(&options)?, probes }))
     }
 
     /// Refuses what does not go together or is out of range.
@@ -219,6 +253,7 @@ impl RenderPath {
         let (parameters, warnings) = (method.for_scene)(parameters, &world.scene)?;
         warnings.iter().for_each(|w| cx.listener.warn(w));
         let budget = Budget::read(self.budget_ms, self.match_time.as_deref(), cx)?;
+        let joined = self.joined()?;
         let setup = Setup {
             world: &world,
             animation: animation.as_ref(),
@@ -228,6 +263,7 @@ impl RenderPath {
             lightmap: lightmap.as_ref(),
             curvature: curvature.as_ref(),
             probes: self.probes.as_deref(),
+            diffuse: joined.as_ref(),
             inspect: self.aov.is_some(),
             gpu_memory: self.gpu_memory.unwrap_or(GPU_MEMORY),
         };
@@ -256,6 +292,10 @@ impl RenderPath {
                 warn_of_partial_set(folder, method, cx);
             }
         }
+        if let Some(Joined { method, probes, .. }) = self.joined()? {
+            let hash = set_hash(&probes, method.reads.probes.map_or("", |p| p.stage))?;
+            provenance = provenance.with_input("diffuse-probes", hash);
+        }
         let curvature = match &self.curvature {
             Some(file) => {
                 provenance = provenance.with_input("curvature", hash_file(file)?);
@@ -280,6 +320,9 @@ impl RenderPath {
 /// Why a method has no use for an option, where it is not plain.
 fn why_not(method: &Method, option: &str) -> &'static str {
     match (option, method.reads.probes, method.reads.lightmap) {
+        ("lights", Some(_), _) if method.uses("diffuse") => {
+            ": its probes hold the light that was baked (--diffuse radiance-probes lights them anew)"
+        }
         ("lights", Some(_), _) => ": its probes hold the light that was baked",
         ("lights", None, Need::Wanted | Need::Required) => ": its light map holds the light that was baked",
         _ => "",
@@ -350,6 +393,7 @@ mod tests {
             for (option, value) in [
                 ("lights", Some("l")),
                 ("probes", Some("p")),
+                ("diffuse", Some("radiance-probes")),
                 ("lightmap", Some("l")),
                 ("curvature", Some("c")),
                 ("supersample", Some("2")),
@@ -366,6 +410,7 @@ mod tests {
                 ("paper", None),
             ] {
                 let mut stage = of(row.name);
+                stage.diffuse_probes = (option == "diffuse" && row.uses(option)).then(|| "t".into());
                 stage.set(&format!("--{option}"), value).unwrap();
                 let result = stage.check();
                 assert_eq!(result.is_ok(), row.uses(option), "{} --{option}: {result:?}", row.name);

@@ -128,18 +128,31 @@ impl RadianceProbesOnGpu {
         Ok(())
     }
 
+    /// The light of the frame whose world [`Self::relight`] took; it goes on from that of the last one, or from darkness.
+    pub fn light(&mut self, seed: u32, goes_on: bool) -> Result<()> {
+        let scene = self.baseline.scene.clone();
+        let mut commands = Commands::new(&scene.gpu);
+        self.light_with(&scene, &mut commands, (seed, goes_on))?;
+        commands.finish().map(|_| ())
+    }
+
+    fn light_with(&self, scene: &GpuScene, commands: &mut Commands, (seed, goes_on): (u32, bool)) -> Result<()> {
+        let gpu = &*scene.gpu;
+        gpu.checked(|| {
+            self.light_receivers(scene, commands, seed)?;
+            self.operator.run(gpu, commands, self.params.bounces, goes_on);
+            Ok(())
+        })
+        .flatten()
+    }
+
     /// A frame; its light's passes are those of Table 2.
-    pub fn frame(&mut self, camera: &Camera, seed: u32, frame: u32) -> Result<BaselineFrame> {
+    pub fn frame(&mut self, camera: &Camera, [seed, frame]: [u32; 2], goes_on: bool) -> Result<BaselineFrame> {
         let scene = self.baseline.scene.clone();
         let gpu = &*scene.gpu;
         let mut commands = Commands::new(gpu);
-        gpu.checked(|| {
-            self.light_receivers(&scene, &mut commands, seed)?;
-            self.operator.run(gpu, &mut commands, self.params.bounces);
-            self.map.run(&scene, &mut commands, &self.operator.indirect);
-            Ok(())
-        })
-        .flatten()?;
+        self.light_with(&scene, &mut commands, (seed, goes_on))?;
+        gpu.checked(|| self.map.run(&scene, &mut commands, &self.operator.indirect))?;
         let (direct, samples) = (&self.direct, self.params.direct_samples);
         self.baseline.frame(camera, false, commands, |commands, camera: &Camera, target: &Target| {
             gpu.clear(&target.glossy);

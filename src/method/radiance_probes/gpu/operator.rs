@@ -175,9 +175,12 @@ impl GpuOperator {
         gpu.checked(|| gpu.queue.write_buffer(&self.reflectance, 0, cast_slice(&colors)))
     }
 
-    /// Makes the indirect light of all receivers from their direct light, by so many bounces.
-    pub(super) fn run(&self, gpu: &Gpu, commands: &mut Commands, bounces: u32) {
-        gpu.clear(&self.indirect);
+    /// Makes the indirect light of all receivers from their direct light, by so many bounces that go on from the light which is there, or from
+    /// darkness.
+    pub(super) fn run(&self, gpu: &Gpu, commands: &mut Commands, bounces: u32, goes_on: bool) {
+        if !goes_on {
+            gpu.clear(&self.indirect);
+        }
         let [radiance, relight, project, reconstruct] = &self.kernels;
         let Self { direct, indirect, lambda, spaces, .. } = self;
         for _ in 0..bounces {
