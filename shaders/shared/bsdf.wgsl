@@ -261,14 +261,22 @@ fn bsdf_diffuse_in(s: Surface, towards_light: vec3<f32>) -> f32 {
 
 // Directional albedo of the diffuse lobe.
 fn bsdf_diffuse_albedo(s: Surface, wi: vec3<f32>) -> vec3<f32> {
+    return diffuse_of_leaves(s, wi, false);
+}
+
+// The view's factor of the diffuse lobe.
+fn bsdf_diffuse_out(s: Surface, wi: vec3<f32>) -> vec3<f32> {
+    return diffuse_of_leaves(s, wi, true);
+}
+
+fn diffuse_of_leaves(s: Surface, wi: vec3<f32>, factors: bool) -> vec3<f32> {
     let root = material_u32(s.material, MATERIAL_MODEL);
     var sum = vec3(0.0);
     var u = 0.0;
     for (var i = 0u; i < model_u32(root, MODEL_LEAVES); i++) {
         var leaf = leaf_at(root, s, wi, i, &u, ALL_LOBES);
         if leaf.share > 0.0 {
-            // The albedo, whether the lobe is a product or not.
-            leaf.factors = false;
+            leaf.factors = leaf.factors && factors;
             sum += leaf.share * leaf_diffuse_out(leaf);
         }
     }

@@ -5,6 +5,11 @@
 
 // Transmitted irradiance at a point of a triangle.
 fn lightmap_lookup(triangle: u32, barycentric: vec2<f32>, back: bool) -> vec3<f32> {
+    return lightmap_lookup_in(0u, triangle, barycentric, back);
+}
+
+// The same in one of several light maps that lie behind each other.
+fn lightmap_lookup_in(map: u32, triangle: u32, barycentric: vec2<f32>, back: bool) -> vec3<f32> {
     let a = light_corner(3u * triangle);
     if (back && scene.light_back == NONE) || !is_finite(a.x) {
         return vec3(0.0);
@@ -17,13 +22,14 @@ fn lightmap_lookup(triangle: u32, barycentric: vec2<f32>, back: bool) -> vec3<f3
     let low = min(vec2<u32>(q), size - 1u);
     let high = min(low + 1u, size - 1u);
     let f = q - vec2<f32>(low);
-    let above = mix(light_texel(low.x, low.y, back), light_texel(high.x, low.y, back), f.x);
-    let below = mix(light_texel(low.x, high.y, back), light_texel(high.x, high.y, back), f.x);
+    let above = mix(light_texel(map, low.x, low.y, back), light_texel(map, high.x, low.y, back), f.x);
+    let below = mix(light_texel(map, low.x, high.y, back), light_texel(map, high.x, high.y, back), f.x);
     return mix(above, below, f.y);
 }
 
-fn light_texel(x: u32, y: u32, back: bool) -> vec3<f32> {
-    let at = select(scene.light_front, scene.light_back, back) + 3u * (y * scene.light_width + x);
+fn light_texel(map: u32, x: u32, y: u32, back: bool) -> vec3<f32> {
+    let row = map * scene.light_height + y;
+    let at = select(scene.light_front, scene.light_back, back) + 3u * (row * scene.light_width + x);
     return vec3(word_f32(at), word_f32(at + 1u), word_f32(at + 2u));
 }
 

@@ -35,7 +35,12 @@ pub(crate) struct Kernel {
 impl Kernel {
     /// Compiles a kernel without a scene.
     pub(crate) fn new(gpu: &Gpu, spec: &'static KernelSpec) -> Result<Self> {
-        Self::compile(gpu, spec, None, &[])
+        Self::with(gpu, spec, &[])
+    }
+
+    /// The same with values of its constants.
+    pub(crate) fn with(gpu: &Gpu, spec: &'static KernelSpec, constants: &[(&str, f64)]) -> Result<Self> {
+        Self::compile(gpu, spec, None, constants)
     }
 
     /// Compiles a kernel in a scene; `constants` are its own overrides.

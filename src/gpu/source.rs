@@ -51,6 +51,7 @@ pub(crate) const FILES: &[(&str, &str)] = files![
     "path_trace/with_variance.wgsl",
     "radiance_probes/cluster_projection.wgsl",
     "radiance_probes/fill_ring.wgsl",
+    "radiance_probes/first_order.wgsl",
     "radiance_probes/map_light.wgsl",
     "radiance_probes/probe_relight.wgsl",
     "radiance_probes/receiver_light.wgsl",

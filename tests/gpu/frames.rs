@@ -61,10 +61,11 @@ impl Baked {
         let bake = "bake-lightfield scene.xml --probes out/probes.json -o out/lightfield --size 32 --spp 2 --bounces 2 --quiet";
         let output = baked.reprobe(bake);
         assert!(output.status.success(), "{}", text(&output.stderr));
-        let bake =
-            "bake-transport scene.xml --probes out/probes.json -o out/transport --texel 0.2 --rays 32 --relight-rays 400 --quiet";
-        let output = baked.reprobe(bake);
-        assert!(output.status.success(), "{}", text(&output.stderr));
+        for options in ["-o out/transport", "-o out/first-order --receiver sh1"] {
+            let bake = "bake-transport scene.xml --probes out/probes.json --texel 0.2 --rays 32 --relight-rays 400 --quiet";
+            let output = baked.reprobe(&format!("{bake} {options}"));
+            assert!(output.status.success(), "{}", text(&output.stderr));
+        }
         baked
     }
 
@@ -81,6 +82,7 @@ impl Baked {
         let choice = device.map_or("cpu", |d| d.name.as_str());
         let inputs = match options.split_whitespace().nth(1).filter(|_| options.starts_with("--method")) {
             Some("light-field-probes") => "--probes out/lightfield",
+            Some("radiance-probes") if options.contains("--probes") => "",
             Some("radiance-probes") => "--probes out/transport",
             Some("ulr") => "--probes out/probes --lightmap out/lightmap.exr",
             Some(_) => "--lightmap out/lightmap.exr",

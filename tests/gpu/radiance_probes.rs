@@ -85,6 +85,7 @@ pub fn commands_render_them(device: &Device) {
         ("probes-direct", "--set bounces=0", 1e-3),
         ("probes-lights", "--lights lights.json", 1e-3),
         ("probes-dark", "--lights dark.json", 1e-3),
+        ("probes-first-order", "--probes out/first-order --lights lights.json", 1e-3),
         ("probes-feedback", "--lights lights.json --set bounces=1 --set feedback=true", 1e-3),
     ] {
         let (frames, timings) = device.baked().both(device, name, &format!("--method radiance-probes {options}"));

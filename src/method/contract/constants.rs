@@ -11,7 +11,7 @@ use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gp
 use crate::method::glossy_probes::{coverage, filter, footprint, perturb, previous, search};
 use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
 use crate::method::path_trace::denoise;
-use crate::method::radiance_probes::{gpu as gpu_radiance_probes, seen};
+use crate::method::radiance_probes::{gpu as gpu_radiance_probes, seen, shade as shade_of_radiance_probes};
 use crate::method::{image_space_gather, ulr};
 use crate::probe::{neighbors, parameter_map as qhmap};
 use crate::transport::{bvh, light_tree, path, sampler};
@@ -132,6 +132,10 @@ fn twins(file: &str) -> Twins {
         "path_trace/add_guides.wgsl" => twins! { ENVIRONMENT_DEPTH = denoise::FAR; },
         "path_trace/denoise.wgsl" => twins! { MIN_ALBEDO = denoise::MIN_ALBEDO; },
         "radiance_probes/fill_ring.wgsl" => twins! { CORNER = fill::CORNER; },
+        "radiance_probes/first_order.wgsl" => twins! {
+            DIRECTIONS = shade_of_radiance_probes::DIRECTIONS;
+            BRANCH = shade_of_radiance_probes::BRANCHES[0];
+        },
         "radiance_probes/probe_relight.wgsl" => twins! { NO_RECEIVER = seen::NO_RECEIVER; },
         "radiance_probes/receiver_light.wgsl" => twins! {
             POINTS = receivers::POINTS;

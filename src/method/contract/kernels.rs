@@ -8,7 +8,7 @@ use crate::method::image_space_gather::gpu as image_space_gather;
 use crate::method::light_field_probes::gpu as light_field_probes;
 use crate::method::lightmap_rt::gpu as lightmap_rt;
 use crate::method::path_trace::{denoise_gpu as denoise, gpu as path_trace};
-use crate::method::radiance_probes::gpu::{self as radiance_probes, light_map, operator};
+use crate::method::radiance_probes::gpu::{self as radiance_probes, first_order, light_map, operator};
 use crate::method::ulr::gpu as ulr;
 
 /// The records of all kernels. A file of shaders/ that none of them needs fails the test.
@@ -40,6 +40,7 @@ pub(crate) const KERNELS: &[&KernelSpec] = &[
     &light_field_probes::TRACE_RAYS,
     &lightmap_rt::MEAN_LIGHT,
     &lightmap_rt::VIEW_STARTS,
+    &first_order::FIRST_ORDER,
     &light_map::FILL_RING,
     &light_map::MAP_LIGHT,
     &mirror::MIRROR_PASS,

@@ -103,6 +103,11 @@ impl Lighting {
         all
     }
 
+    /// Where receivers that keep sh1 face; empty for others.
+    pub fn normals(&self) -> &[Vec3] {
+        &self.normals
+    }
+
     /// Whether frames differ in what receivers send on.
     pub fn changes(&self) -> bool {
         !self.changing.is_empty()

@@ -95,7 +95,7 @@ pub struct RadianceProbeParams {
     pub gloss_samples: u32,
     /// Samples of direct light, a receiver.
     pub map_samples: u32,
-    /// How often light goes from the receivers to the probes and back.
+    /// How often light goes from the receivers to the probes and back; among walls of albedo .7, four times would leave a sixth of it out.
     pub bounces: u32,
     /// Whether it goes on from the light of the frame before. *Paper* (§4.2): yes, and once a frame. *Ours*: frames are lit by themselves, so that
     /// light that is switched on is there at once, and any frame can be made alone.
@@ -104,7 +104,7 @@ pub struct RadianceProbeParams {
 
 impl Default for RadianceProbeParams {
     fn default() -> Self {
-        Self { supersample: 1, direct_samples: 8, gloss_samples: 0, map_samples: 4, bounces: 4, feedback: false }
+        Self { supersample: 1, direct_samples: 8, gloss_samples: 0, map_samples: 4, bounces: 12, feedback: false }
     }
 }
 

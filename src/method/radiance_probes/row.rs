@@ -4,7 +4,6 @@ use super::gpu::RadianceProbesOnGpu;
 use super::light::Lighting;
 use super::lit::Lit;
 use super::params::RadianceProbeParams;
-use super::transport::Kept;
 use crate::base::clock::Clock;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
@@ -93,11 +92,6 @@ struct OnGpu<'a> {
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let lighting = Lighting::load(setup)?;
-    if lighting.transport.params.receiver != Kept::Irradiance {
-        let message =
-            "the GPU's radiance probes have receivers of irradiance alone (bake-transport --receiver); use --device cpu";
-        return Err(Error::Request(message.into()));
-    }
     let params: RadianceProbeParams = setup.parameters()?;
     if params.gloss_samples > 0 {
         return Err(Error::Request("the GPU's radiance probes have no gloss_samples; use --device cpu".into()));

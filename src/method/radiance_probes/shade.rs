@@ -18,10 +18,10 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Directions by which light of first order is taken in.
-const DIRECTIONS: u32 = 16;
+pub(crate) const DIRECTIONS: u32 = 16;
 
 /// Branches of a pixel's random stream: direct light of the glossy layer, and paths along its lobes.
-const BRANCHES: [u32; 2] = [1, 2];
+pub(crate) const BRANCHES: [u32; 2] = [1, 2];
 
 /// Light that comes by way of the probes, where pixels look it up.
 pub enum Indirect {

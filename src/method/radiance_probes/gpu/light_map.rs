@@ -16,6 +16,9 @@ use bytemuck::{Pod, Zeroable, cast_slice};
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct MapParams {
     map: u32,
+    texels: u32,
+    number: u32,
+    numbers: u32,
 }
 
 /// `Params` of fill_ring.wgsl.
@@ -45,7 +48,7 @@ pub(crate) const FILL_RING: KernelSpec = KernelSpec {
     bindings: &[("params", Uniform), ("pixels", Read), ("firsts", Read), ("neighbours", Read), ("light", ReadWrite)],
     structs: &[&RING_PARAMS],
 };
-const MAP_PARAMS: StructLayout = layout!(MapParams as "Params" { map });
+const MAP_PARAMS: StructLayout = layout!(MapParams as "Params" { map, texels, number, numbers });
 const RING_PARAMS: StructLayout = layout!(RingParams as "Params" { map, first, end });
 
 /// Rings of one side on the device.
@@ -57,38 +60,46 @@ struct GpuRings {
     rings: Vec<(wgpu::Buffer, u32)>,
 }
 
-/// What writes a frame's light into the light map of a scene.
+/// What writes a frame's light into the light map of a scene, or of each of the receivers' numbers into one of several.
 pub(super) struct MapLight {
     map: Kernel,
     fill: Kernel,
-    params: wgpu::Buffer,
+    /// Of each number that receivers keep.
+    params: Vec<wgpu::Buffer>,
     places: wgpu::Buffer,
     receivers: u32,
     sides: Vec<GpuRings>,
 }
 
 impl MapLight {
-    /// For a scene that has [`FrameMap::dark`].
-    pub(super) fn new(scene: &GpuScene, map: &FrameMap) -> Result<Self> {
+    /// For a scene that has [`FrameMap::dark`], `numbers` times behind each other.
+    pub(super) fn new(scene: &GpuScene, map: &FrameMap, numbers: u32) -> Result<Self> {
         let gpu = &scene.gpu;
         let first = scene.light_words().1;
-        let texels = map.dark.front.len() as u32;
-        let is_there = |side: &(u32, &Rings)| !side.1.pixels.is_empty();
-        let sides = [0, 1].map(|side| (first + 3 * side * texels, &map.rings[side as usize]));
+        let texels = (map.dark.size[0] * map.dark.size[1]).max(1);
+        let params = |number| {
+            let params = MapParams { map: first, texels, number, numbers };
+            gpu.uniform("parameters of the light map", &params)
+        };
+        let all = (0..2).flat_map(|side| (0..numbers).map(move |number| (side, number)));
+        let sides = all.map(|(side, number)| (first + 3 * (side * numbers + number) * texels, &map.rings[side as usize]));
+        let sides = sides.filter(|(_, rings)| !rings.pixels.is_empty());
         Ok(Self {
             map: Kernel::new(gpu, &MAP_LIGHT)?,
             fill: Kernel::new(gpu, &FILL_RING)?,
-            params: gpu.uniform("parameters of the light map", &MapParams { map: first })?,
+            params: (0..numbers).map(params).collect::<Result<_>>()?,
             places: gpu.upload("texels of receivers", cast_slice(&map.places))?,
             receivers: map.places.len() as u32,
-            sides: sides.into_iter().filter(is_there).map(|(at, rings)| GpuRings::new(gpu, rings, at)).collect::<Result<_>>()?,
+            sides: sides.map(|(at, rings)| GpuRings::new(gpu, rings, at)).collect::<Result<_>>()?,
         })
     }
 
     /// Puts the receivers' light there.
     pub(super) fn run(&self, scene: &GpuScene, commands: &mut Commands, indirect: &wgpu::Buffer) {
         let light = scene.light_words().0;
-        commands.run("light map", &self.map, &[&self.params, &self.places, indirect, light], [self.receivers, 1]);
+        for params in &self.params {
+            commands.run("light map", &self.map, &[params, &self.places, indirect, light], [self.receivers, 1]);
+        }
         for side in &self.sides {
             for (params, count) in &side.rings {
                 let buffers = [params, &side.pixels, &side.firsts, &side.neighbours, light];

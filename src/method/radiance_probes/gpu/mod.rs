@@ -1,11 +1,13 @@
 //! Frames by radiance probes on a device: the twin of [`super::light`] and of what `render-path` makes of it.
 
+pub(crate) mod first_order;
 pub(crate) mod light_map;
 pub(crate) mod operator;
 
 use super::frame_map::FrameMap;
 use super::light::Lighting;
 use super::params::RadianceProbeParams;
+use super::transport::Kept;
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::gpu::Gpu;
@@ -16,10 +18,12 @@ use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::direct::{DirectLight, runs};
 use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
+use crate::lightmap::LightMap;
 use crate::lightmap::receivers::{POINTS, Receiver};
 use crate::scene::Camera;
 use crate::transport::World;
 use bytemuck::{Pod, Zeroable, cast_slice};
+use first_order::FirstOrder;
 use glam::Vec4;
 use light_map::MapLight;
 use operator::GpuOperator;
@@ -58,6 +62,8 @@ pub struct RadianceProbesOnGpu {
     operator: GpuOperator,
     map: MapLight,
     direct: DirectLight,
+    /// Where receivers keep sh1.
+    first_order: Option<FirstOrder>,
     params: RadianceProbeParams,
 }
 
@@ -69,19 +75,23 @@ pub struct Passes {
     pub lambda: Vec<Rgb>,
     /// Light of the clusters' spaces, one after the other.
     pub spaces: Vec<Rgb>,
-    /// What comes to each receiver by way of the probes.
+    /// What comes to each receiver by way of the probes, as many numbers as it keeps.
     pub indirect: Vec<Rgb>,
 }
 
 impl RadianceProbesOnGpu {
-    /// Uploads an operator that keeps irradiance, in pieces of `piece` bytes at the most, and compiles the passes.
+    /// Uploads an operator in pieces of `piece` bytes at the most, and compiles the passes.
     pub fn new(gpu: Arc<Gpu>, world: &World, lighting: &Lighting, params: &RadianceProbeParams, piece: u64) -> Result<Self> {
         let transport = &lighting.transport;
         // The operator first: where it does not fit, nothing else need be made.
-        let operator = GpuOperator::new(&gpu, transport, piece)?;
+        let operator = GpuOperator::new(&gpu, transport, lighting.normals(), piece)?;
+        let numbers = transport.params.receiver.rows();
         operator.set_reflectance(&gpu, &lighting.reflectances(world))?;
         let map = FrameMap::new(&world.scene.geometry, transport);
-        let baseline = Baseline::new(gpu.clone(), world, Some(&map.dark), params.supersample)?;
+        // A light map of each number.
+        let dark = |side: &Vec<Rgb>| vec![Rgb::ZERO; side.len() * numbers];
+        let maps = LightMap { front: dark(&map.dark.front), back: map.dark.back.as_ref().map(dark), ..map.dark.clone() };
+        let baseline = Baseline::new(gpu.clone(), world, Some(&maps), params.supersample)?;
         let scene = &*baseline.scene;
         let words: Vec<u32> = transport.receivers.iter().flat_map(words_of).collect();
         Ok(Self {
@@ -89,7 +99,8 @@ impl RadianceProbesOnGpu {
             receivers: gpu.upload("receivers", cast_slice(&words))?,
             count: transport.receivers.len() as u32,
             operator,
-            map: MapLight::new(scene, &map)?,
+            map: MapLight::new(scene, &map, numbers as u32)?,
+            first_order: (transport.params.receiver == Kept::Sh1).then(|| FirstOrder::new(scene)).transpose()?,
             direct: DirectLight::new(scene)?,
             params: *params,
             baseline,
@@ -121,6 +132,9 @@ impl RadianceProbesOnGpu {
         let scene = self.baseline.scene.at(world)?;
         self.receiver_light.rebind(&scene);
         self.direct.rebind(&scene);
+        if let Some(first_order) = &mut self.first_order {
+            first_order.rebind(&scene);
+        }
         if lighting.changes() {
             self.operator.set_reflectance(&scene.gpu, &lighting.reflectances(world))?;
         }
@@ -153,9 +167,12 @@ impl RadianceProbesOnGpu {
         let mut commands = Commands::new(gpu);
         self.light_with(&scene, &mut commands, (seed, goes_on))?;
         gpu.checked(|| self.map.run(&scene, &mut commands, &self.operator.indirect))?;
-        let (direct, samples) = (&self.direct, self.params.direct_samples);
+        let (direct, first_order, samples) = (&self.direct, &self.first_order, self.params.direct_samples);
         self.baseline.frame(camera, false, commands, |commands, camera: &Camera, target: &Target| {
-            gpu.clear(&target.glossy);
+            match first_order {
+                Some(first_order) => first_order.run(&scene, commands, (camera, target), samples, [seed, frame])?,
+                None => gpu.clear(&target.glossy),
+            }
             direct.run(&scene, (commands, "diffuse"), (camera, &target.view), samples, [seed, frame])
         })
     }

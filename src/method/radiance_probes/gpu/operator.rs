@@ -10,6 +10,7 @@ use crate::method::radiance_probes::compress::Cluster;
 use crate::method::radiance_probes::operator::Transport;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable, cast_slice};
+use glam::{Vec3, Vec4};
 use half::f16;
 use std::ops::Range;
 
@@ -59,7 +60,7 @@ pub(crate) const RECEIVER_RADIANCE: KernelSpec = KernelSpec {
     twin: "src/method/radiance_probes/light.rs: radiance",
     workgroup: [64, 1],
     scene: false,
-    bindings: &[("direct", Read), ("indirect", Read), ("reflectance", Read), ("radiance", ReadWrite)],
+    bindings: &[("direct", Read), ("indirect", Read), ("reflectance", Read), ("normals", Read), ("radiance", ReadWrite)],
     structs: &[],
 };
 /// What probes see of it.
@@ -129,14 +130,17 @@ pub(super) struct GpuOperator {
     pub(super) spaces: wgpu::Buffer,
     radiance: wgpu::Buffer,
     reflectance: wgpu::Buffer,
+    normals: wgpu::Buffer,
 }
 
 impl GpuOperator {
-    /// Uploads an operator of irradiance in pieces of so many bytes at the most.
-    pub(super) fn new(gpu: &Gpu, transport: &Transport, piece: u64) -> Result<Self> {
+    /// Uploads an operator in pieces of so many bytes at the most. `normals`: where receivers face that keep more than irradiance.
+    pub(super) fn new(gpu: &Gpu, transport: &Transport, normals: &[Vec3], piece: u64) -> Result<Self> {
         let (receivers, probes) = (transport.receivers.len(), transport.probes.len());
         let (rays, terms) = (transport.rays.directions.len() as u32, transport.params.terms() as u32);
-        for (what, count, most) in [("receivers", receivers, 64 * MOST_GROUPS), ("probes", probes, MOST_GROUPS)] {
+        for (what, count, most) in
+            [("receivers", receivers * transport.params.receiver.rows(), 64 * MOST_GROUPS), ("probes", probes, MOST_GROUPS)]
+        {
             if count > most {
                 return Err(Error::Request(format!("{count} {what}: a GPU's kernels take {most} at the most; use --device cpu")));
             }
@@ -145,10 +149,11 @@ impl GpuOperator {
         let space: usize = transport.clusters.iter().map(|c| c.rank).sum();
         let mut first_space = 0;
         let mut upload = |range| Part::new(gpu, transport, range, &mut first_space);
-        let specs = [&RECEIVER_RADIANCE, &PROBE_RELIGHT, &CLUSTER_PROJECTION, &RECONSTRUCT];
-        let [a, b, c, d] = specs.map(|spec| Kernel::new(gpu, spec));
+        let [b, c, d] = [&PROBE_RELIGHT, &CLUSTER_PROJECTION, &RECONSTRUCT].map(|spec| Kernel::new(gpu, spec));
+        let numbers = transport.params.receiver.rows();
+        let normals: Vec<Vec4> = normals.iter().map(|n| n.extend(0.0)).collect();
         Ok(Self {
-            kernels: [a?, b?, c?, d?],
+            kernels: [Kernel::with(gpu, &RECEIVER_RADIANCE, &[("NUMBERS", numbers as f64)])?, b?, c?, d?],
             receivers: receivers as u32,
             probes: probes as u32,
             terms,
@@ -156,16 +161,18 @@ impl GpuOperator {
             projection_params: gpu.uniform("parameters of projection", &ProjectionParams { terms })?,
             hits: gpu.upload("what the relight rays of radiance probes meet", cast_slice(&transport.hits))?,
             weighted: gpu.upload("harmonics of relight rays", cast_slice(&transport.rays.by_ray()))?,
-            parts: pieces(&transport.clusters, transport.params.terms(), piece)
+            parts: pieces(&transport.clusters, [transport.params.terms(), numbers], piece)
                 .into_iter()
                 .map(&mut upload)
                 .collect::<Result<_>>()?,
             direct: colors("direct light of receivers", receivers)?,
-            indirect: colors("indirect light of receivers", receivers)?,
+            indirect: colors("indirect light of receivers", receivers * numbers)?,
             lambda: colors("light of radiance probes", probes * terms as usize)?,
             spaces: colors("light of clusters", space)?,
             radiance: colors("radiance of receivers", receivers)?,
             reflectance: colors("reflectance of receivers", receivers)?,
+            normals: gpu
+                .upload("where receivers face", cast_slice(if normals.is_empty() { &[Vec4::ZERO] } else { &normals[..] }))?,
         })
     }
 
@@ -184,7 +191,7 @@ impl GpuOperator {
         let [radiance, relight, project, reconstruct] = &self.kernels;
         let Self { direct, indirect, lambda, spaces, .. } = self;
         for _ in 0..bounces {
-            let buffers = [direct, indirect, &self.reflectance, &self.radiance];
+            let buffers = [direct, indirect, &self.reflectance, &self.normals, &self.radiance];
             commands.run("probe relight", radiance, &buffers, [self.receivers, 1]);
             let buffers = [&self.relight_params, &self.hits, &self.radiance, &self.weighted, lambda];
             let size = [self.probes * PROBE_RELIGHT.workgroup[0], self.terms.div_ceil(TERMS)];
@@ -228,10 +235,11 @@ fn pack(halves: &[f16], width: usize, out: &mut Vec<u32>) {
 }
 
 /// Runs of clusters that have none of their tables larger than `most` bytes, but for clusters that are so alone.
-fn pieces(clusters: &[Cluster], terms: usize, most: u64) -> Vec<Range<usize>> {
+/// [terms, numbers]: harmonics of a probe and numbers of a receiver.
+fn pieces(clusters: &[Cluster], [terms, numbers]: [usize; 2], most: u64) -> Vec<Range<usize>> {
     let (mut done, mut first, mut sum) = (Vec::new(), 0, [0u64; 2]);
     for (i, c) in clusters.iter().enumerate() {
-        let words = [c.rank * words(c.probes.len() * terms), c.receivers.len() * words(c.rank).max(4)];
+        let words = [c.rank * words(c.probes.len() * terms), c.receivers.len() * numbers * words(c.rank).max(4)];
         let next = [0, 1].map(|k| sum[k] + 4 * words[k] as u64);
         if next.iter().any(|&bytes| bytes > most) && i > first {
             done.push(first..i);
@@ -252,6 +260,7 @@ impl Part {
     fn new(gpu: &Gpu, transport: &Transport, range: Range<usize>, space: &mut u32) -> Result<Self> {
         let (mut rows, mut probes, mut projection) = (Vec::new(), Vec::<u32>::new(), Vec::new());
         let (mut members, mut reconstruction) = (Vec::new(), Vec::new());
+        let numbers = transport.params.receiver.rows() as u32;
         for c in &transport.clusters[range] {
             let (rank, width) = (c.rank as u32, c.probes.len() * transport.params.terms());
             let [row, member] = [projection.len(), reconstruction.len()].map(|n| n as u32);
@@ -262,7 +271,8 @@ impl Part {
                 width: width as u32,
                 space: *space + k,
             }));
-            members.extend(c.receivers.iter().zip(0..).map(|(&receiver, k)| Member {
+            let kept = c.receivers.iter().flat_map(|&r| (0..numbers).map(move |k| r * numbers + k));
+            members.extend(kept.zip(0..).map(|(receiver, k)| Member {
                 receiver,
                 first: member + k * words(c.rank) as u32,
                 space: *space,
@@ -300,9 +310,9 @@ mod tests {
         };
         let clusters = [10, 10, 10, 1000, 10].map(cluster);
         // Rows of 18 halves take 108 bytes a cluster; 10 members take 160.
-        assert_eq!(pieces(&clusters, 9, 320), [0..2, 2..3, 3..4, 4..5]);
-        assert_eq!(pieces(&clusters, 9, 1 << 20), vec![0..5]);
-        assert!(pieces(&[], 9, 100).is_empty());
+        assert_eq!(pieces(&clusters, [9, 1], 320), [0..2, 2..3, 3..4, 4..5]);
+        assert_eq!(pieces(&clusters, [9, 1], 1 << 20), vec![0..5]);
+        assert!(pieces(&[], [9, 1], 100).is_empty());
     }
 
     #[test]
