@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """Light maps by radiance probes against a path-traced one, texel by texel.
 
-    python3 scripts/transport_vs_lightmap.py SCENE --reference lightmap.exr [--bounces 12] [--samples 64] TRANSPORT...
+    python3 scripts/transport_vs_lightmap.py SCENE --reference lightmap.exr [--direct direct.exr] [--bounces 12] [--samples 64] TRANSPORT...
 
 Each TRANSPORT is a folder that `bake-transport` wrote, the reference what `bake-lightmap` wrote with the same --texels or --texel. Each is
 lit by `reprobe relight` (into a temporary folder). Columns: probes, order, radius of support, receivers, MB of the operator as half floats;
 RMS error of indirect irradiance, relative to the RMS of indirect irradiance itself, the same without the worst 1 % of the texels, and the
-difference of the means. Indirect is what the reference has over direct light, which both have from the same code.
+difference of the means. Indirect is what the reference has over direct light, which both have from the same code; or with --direct, over a light
+map of the same scene with black surfaces (`diffuse_scene.py --reflectance 0`): a receiver has direct light at four of its points alone, which
+differs from a texel's mean at the edges of hard shadows.
 
 Needs reprobe in the PATH (or REPROBE), and pip install OpenEXR numpy.
 """
@@ -72,6 +74,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene")
     parser.add_argument("--reference", required=True)
+    parser.add_argument("--direct")
     parser.add_argument("--bounces", type=int, default=12)
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("transport", nargs="+")
@@ -80,9 +83,9 @@ def main():
     for folder in args.transport:
         direct, pixels, back = relight(args, folder, "--set", "bounces=0")
         found, _, _ = relight(args, folder, "--set", f"bounces={args.bounces}")
-        expected = irradiance(args.reference, pixels, back)
-        indirect = expected - direct
-        squares = ((found - expected) ** 2).sum(-1)
+        straight = irradiance(args.direct, pixels, back) if args.direct else direct
+        indirect = irradiance(args.reference, pixels, back) - straight
+        squares = ((found - direct - indirect) ** 2).sum(-1)
         size = (indirect**2).sum(-1).mean()
         kept = np.sort(squares)[: int(0.99 * len(squares))]
         bake = json.load(open(os.path.join(folder, "set.json")))

@@ -17,6 +17,7 @@ use crate::method::Setup;
 use crate::scene::Animation;
 use crate::transport::path::{PathParams, transmitted_irradiance};
 use crate::transport::{Sampler, World};
+use crate::view::gbuffer::GLOSSY;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -47,16 +48,22 @@ pub fn direct(world: &World, receivers: &[Receiver], samples: u32, seed: u32) ->
     receivers.par_iter().with_min_len(64).map(of).collect()
 }
 
-/// What of E_T a receiver sends on as diffuse radiance: the mean over directions of `diffuse_out`, over π.
+/// What of E_T a receiver sends on as diffuse radiance: the mean over directions of `diffuse_out`, over π. *Ours*: what its other lobes reflect
+/// goes on as if it were diffuse, of an irradiance that is E_T before the coat; in the paper it is lost.
 fn reflectance(world: &World, r: &Receiver) -> Rgb {
     let side = if r.back { -1.0 } else { 1.0 };
-    let out = |k: usize| {
+    let (mut diffuse, mut others, mut entering) = (Rgb::ZERO, Rgb::ZERO, 0.0);
+    for k in 0..POINTS {
         let at = r.surface(world, k);
         let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / POINTS as f32, (0.618 * k as f32 + 0.3).fract()));
+        let d = Vec3::new(d.x, d.y, d.z * side);
         let bsdf = &world.scene.materials[at.material as usize].bsdf;
-        bsdf.diffuse_out(&at, Vec3::new(d.x, d.y, d.z * side))
-    };
-    (0..POINTS).map(out).sum::<Rgb>() * (FRAC_1_PI / POINTS as f32)
+        diffuse += bsdf.diffuse_out(&at, d);
+        others += bsdf.glossy_albedo(&at, d, GLOSSY);
+        entering += bsdf.diffuse_in(&at, d);
+    }
+    let before = if entering > 0.0 { POINTS as f32 / entering } else { 0.0 };
+    (diffuse + others * before) * (FRAC_1_PI / POINTS as f32)
 }
 
 /// What lights frames: the operator, and what receivers send on.
