@@ -1,6 +1,5 @@
 //! Path tracing in the table of methods.
 
-use super::denoise::{DenoiseParams, denoise, guides};
 use super::denoise_gpu::Denoiser;
 use super::gpu::PathTracer;
 use super::{PathTraceParams, path_trace, path_trace_full};
@@ -13,6 +12,7 @@ use crate::scene::Scene;
 use crate::scene::film::Filter;
 use crate::transport::path::PathParams;
 use crate::view::View;
+use crate::view::denoise::{DenoiseParams, denoise, guides};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
