@@ -123,7 +123,13 @@ impl Renderer for OnCpu<'_> {
         if self.params.layers == LayerChoice::Full {
             let full = path_trace_full(world, camera, &params, seed, *frame, progress);
             clock.lap("path_trace");
-            return Ok(Frame { picture: Picture::Full(full), passes: clock.laps, unserved: None, inspected: None });
+            return Ok(Frame {
+                picture: Picture::Full(full),
+                passes: clock.laps,
+                unserved: None,
+                counts: Vec::new(),
+                inspected: None,
+            });
         }
         let mut layers = path_trace(world, camera, &params, seed, *frame, progress);
         clock.lap("path_trace");
@@ -164,7 +170,13 @@ impl Renderer for OnGpu {
         if self.layers == LayerChoice::Full {
             let full = self.tracer.full(camera, spp, seed, *frame, progress)?;
             clock.lap("path_trace");
-            return Ok(Frame { picture: Picture::Full(full), passes: clock.laps, unserved: None, inspected: None });
+            return Ok(Frame {
+                picture: Picture::Full(full),
+                passes: clock.laps,
+                unserved: None,
+                counts: Vec::new(),
+                inspected: None,
+            });
         }
         let mut layers = self.tracer.layers(camera, spp, seed, *frame, progress)?;
         clock.lap("path_trace");
