@@ -72,6 +72,8 @@ def stages(scene, path, out):
         ["relight", scene, "--probes", f"{out}/transport", "-o", f"{out}/lightmaps"],
         frames("radiance", *views, "--method", "radiance-probes", "--probes", f"{out}/transport"),
         frames("radiance-sh1", *views, "--method", "radiance-probes", "--probes", f"{out}/transport-sh1"),
+        frames("many-light", *views, "--method", "many-light"),
+        frames("many-light-shadows", *views, "--method", "many-light", "--set", "vpls=2000", "--set", "shadow_rays=2", "--set", "sphere=2", "--set", "sampling=full"),
         ["inspect-transport", scene, "--probes", f"{out}/transport", "--receivers", "200", "-o", f"{out}/lost.png"],
         ["compare", f"{out}/glossy", f"{out}/path-trace", "--layer", "glossy", "-o", f"{out}/report"],
         ["run", scene, *views, "--preset", "draft", "--probes", "3", "--spp", "4", "--lightmap-spp", "4", "--reference-spp", "2", "--probe-size", "128x64", "-o", f"{out}/run"],

@@ -444,7 +444,7 @@ fn frames_from_the_command_line() {
     let message = f.refusal("render-path scene.xml --lights lights.json --probes p --curvature c -o no");
     assert!(
         message.contains(
-            "--lights: --method glossy-probes has no use for it: its probes hold the light that was baked; path-trace, radiance-probes has"
+            "--lights: --method glossy-probes has no use for it: its probes hold the light that was baked; path-trace, radiance-probes, many-light has"
         ),
         "{message}"
     );

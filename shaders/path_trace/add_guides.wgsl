@@ -1,4 +1,4 @@
-// Twin of src/method/path_trace/denoise.rs: guides.
+// Twin of src/view/denoise.rs: guides.
 // Guides of the denoiser, one camera ray of each pixel at a time.
 
 // #include "shared/camera_ray.wgsl"

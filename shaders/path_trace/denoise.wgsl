@@ -1,4 +1,4 @@
-// What the kernels of the denoiser of path-traced layers share, an edge-avoiding a-trous wavelet filter. Twin: src/method/path_trace/denoise.rs.
+// What the kernels of the denoiser of path-traced layers share, an edge-avoiding a-trous wavelet filter. Twin: src/view/denoise.rs.
 //
 // denoise_start.wgsl divides a layer by its albedo, despeckle.wgsl cuts rare paths, with_variance.wgsl finds the noise, smooth_level.wgsl is a
 // level of the wavelet and denoise_end.wgsl multiplies the albedo in again.

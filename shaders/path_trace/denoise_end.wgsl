@@ -1,4 +1,4 @@
-// Twin of src/method/path_trace/denoise.rs: filter_layer.
+// Twin of src/view/denoise.rs: filter_layer.
 
 // #include "path_trace/denoise.wgsl"
 

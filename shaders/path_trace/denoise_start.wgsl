@@ -1,4 +1,4 @@
-// Twin of src/method/path_trace/denoise.rs: slopes.
+// Twin of src/view/denoise.rs: slopes.
 
 // #include "path_trace/denoise.wgsl"
 

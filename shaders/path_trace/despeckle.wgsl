@@ -1,4 +1,4 @@
-// Twin of src/method/path_trace/denoise.rs: despeckled.
+// Twin of src/view/denoise.rs: despeckled.
 
 // #include "path_trace/denoise.wgsl"
 

@@ -1,4 +1,4 @@
-// Twin of src/method/path_trace/denoise.rs: smoothed.
+// Twin of src/view/denoise.rs: smoothed.
 
 // #include "path_trace/denoise.wgsl"
 

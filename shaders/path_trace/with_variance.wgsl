@@ -1,4 +1,4 @@
-// Twin of src/method/path_trace/denoise.rs: with_variance.
+// Twin of src/view/denoise.rs: with_variance.
 
 // #include "path_trace/denoise.wgsl"
 

@@ -9,6 +9,7 @@ pub mod glossy_probes;
 pub mod image_space_gather;
 pub mod light_field_probes;
 pub mod lightmap_rt;
+pub mod many_light;
 pub mod path_trace;
 pub mod radiance_probes;
 pub mod ulr;
@@ -39,6 +40,7 @@ pub const METHODS: &[&Method] = &[
     &lightmap_rt::METHOD,
     &light_field_probes::METHOD,
     &radiance_probes::METHOD,
+    &many_light::METHOD,
 ];
 
 /// A row of the table.
@@ -293,6 +295,8 @@ pub struct Frame {
     pub passes: Vec<(&'static str, f64)>,
     /// Sub-pixels that neither a probe nor the frame before served; `None` for methods without probes.
     pub unserved: Option<usize>,
+    /// What else was counted, by name.
+    pub counts: Vec<(&'static str, f64)>,
     /// Layers that show how it came about, where they were asked for.
     pub inspected: Option<ExrImage>,
 }
@@ -308,7 +312,7 @@ pub enum Picture {
 impl Frame {
     /// A frame of layers, without anything else to tell.
     pub fn of(layers: LayerImages, passes: Vec<(&'static str, f64)>) -> Self {
-        Self { picture: Picture::Layers(layers), passes, unserved: None, inspected: None }
+        Self { picture: Picture::Layers(layers), passes, unserved: None, counts: Vec::new(), inspected: None }
     }
 
     /// Adds the picture and its layers to an image.

@@ -67,6 +67,7 @@ pub fn render(frames: &Frames, cx: &Context, mut timings: Timings) -> Result<Out
             timings.note_probes(renderer.probe_bytes());
             times.passes(&frame.passes);
             times.unserved_fraction = frame.unserved.map(|n| n as f64 / frames.sub_pixels(view));
+            times.counts = frame.counts.iter().map(|&(what, count)| (what.into(), count)).collect();
             let image = times.pass_if(frames.setup.inspect, "aov", || frames.image(&frame, view));
             let path = frames.output.join(&times.name);
             times.pass("write", || image.with_provenance(provenance).write(&path))?;

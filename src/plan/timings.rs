@@ -47,6 +47,9 @@ pub struct FrameTimings {
     pub kept: bool,
     /// Share of sub-pixels that neither a probe nor the frame before served; `None` for methods without probes.
     pub unserved_fraction: Option<f64>,
+    /// What else the method counts, by name: shading points, say.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub counts: BTreeMap<String, f64>,
     /// Milliseconds of each pass, in the run that rendered the frame.
     pub passes_ms: BTreeMap<String, f64>,
 }

@@ -3,6 +3,7 @@
 pub mod aov;
 pub mod baseline;
 pub mod composite;
+pub mod denoise;
 pub mod direct;
 pub mod gbuffer;
 pub mod layers;

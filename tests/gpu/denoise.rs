@@ -5,11 +5,11 @@ use crate::{Device, room};
 use reprobe::base::math::Rgb;
 use reprobe::base::progress::Silent;
 use reprobe::gpu::{Gpu, GpuScene};
-use reprobe::method::path_trace::denoise::{DenoiseParams, Guide, denoise, guides};
 use reprobe::method::path_trace::denoise_gpu::{Denoiser, GpuGuides};
 use reprobe::method::path_trace::{PathTraceParams, path_trace};
 use reprobe::scene::Camera;
 use reprobe::transport::World;
+use reprobe::view::denoise::{DenoiseParams, Guide, denoise, guides};
 use std::sync::Arc;
 
 fn rmse(a: &[Rgb], b: &[Rgb]) -> f32 {

@@ -17,6 +17,7 @@ use std::path::PathBuf;
   reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 256 -o reference/
   reprobe render-path room/scene.xml --path room/path.json --method lightmap-rt --lightmap lightmap.exr --match-time frames/ -o rays/
   reprobe render-path room/scene.xml --lights lights.json --method path-trace --spp 64 -o evening/
+  reprobe render-path room/scene.xml --lights lights.json --method many-light --set bounces=3 -o preview/
 
 A lamp that is carried through a darkened room for two seconds, as lights.json says it (docs/lights.md has all there is):
   {\"fps\": 24, \"scene_lights\": false, \"lights\": [

@@ -91,7 +91,7 @@ impl<R> WithProbes<R> {
         let [width, height] = view.camera.size.map(|n| n as usize);
         let inspected = buffers.map(|buffers| with_passes(ExrImage::new(width, height), &buffers, self.supersample));
         let layers = LayerImages { emission, diffuse, glossy };
-        Frame { picture: Picture::Layers(layers), passes, unserved: Some(unserved), inspected }
+        Frame { picture: Picture::Layers(layers), passes, unserved: Some(unserved), counts: Vec::new(), inspected }
     }
 }
 

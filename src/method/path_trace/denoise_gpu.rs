@@ -1,6 +1,5 @@
-//! The denoiser of path-traced frames: the twin of [`crate::method::path_trace::denoise`].
+//! The denoiser of path-traced frames: the twin of [`crate::view::denoise`].
 
-use super::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, MOST_LEVELS, NEIGHBOURS};
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::gpu::Gpu;
@@ -10,6 +9,7 @@ use crate::gpu::scene::GpuScene;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{Access, KernelSpec, StructLayout, layout};
 use crate::scene::Camera;
+use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, MOST_LEVELS, NEIGHBOURS};
 use crate::view::layers::LayerImages;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
@@ -72,7 +72,7 @@ impl From<&GpuGuide> for Guide {
 /// The guides' kernel.
 pub(crate) const ADD_GUIDES: KernelSpec = KernelSpec {
     file: "path_trace/add_guides.wgsl",
-    twin: "src/method/path_trace/denoise.rs: guides",
+    twin: "src/view/denoise.rs: guides",
     workgroup: [8, 8],
     scene: true,
     bindings: &[("guide_params", Uniform), ("diffuse_guides", ReadWrite), ("glossy_guides", ReadWrite)],
@@ -92,31 +92,31 @@ const fn filter_kernel(file: &'static str, twin: &'static str, bindings: &'stati
 /// Divides a layer by its albedo, and finds how depth changes.
 pub(crate) const DENOISE_START: KernelSpec = filter_kernel(
     "path_trace/denoise_start.wgsl",
-    "src/method/path_trace/denoise.rs: slopes",
+    "src/view/denoise.rs: slopes",
     &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite), ("slopes", ReadWrite)],
 );
 /// Cuts rare paths.
 pub(crate) const DESPECKLE: KernelSpec = filter_kernel(
     "path_trace/despeckle.wgsl",
-    "src/method/path_trace/denoise.rs: despeckled",
+    "src/view/denoise.rs: despeckled",
     &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite)],
 );
 /// Finds the noise.
 pub(crate) const WITH_VARIANCE: KernelSpec = filter_kernel(
     "path_trace/with_variance.wgsl",
-    "src/method/path_trace/denoise.rs: with_variance",
+    "src/view/denoise.rs: with_variance",
     &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite), ("slopes", Read)],
 );
 /// A level of the wavelet.
 pub(crate) const SMOOTH_LEVEL: KernelSpec = filter_kernel(
     "path_trace/smooth_level.wgsl",
-    "src/method/path_trace/denoise.rs: smoothed",
+    "src/view/denoise.rs: smoothed",
     &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite), ("slopes", Read)],
 );
 /// Multiplies the albedo in again.
 pub(crate) const DENOISE_END: KernelSpec = filter_kernel(
     "path_trace/denoise_end.wgsl",
-    "src/method/path_trace/denoise.rs: filter_layer",
+    "src/view/denoise.rs: filter_layer",
     &[("denoise_params", Uniform), ("guides", Read), ("source", Read), ("result", ReadWrite)],
 );
 
@@ -170,7 +170,7 @@ impl Denoiser {
         Ok(Self { guides, filter, params: *params, scene })
     }
 
-    /// The guides of a frame, as [`crate::method::path_trace::denoise::guides`] has them; a dispatch for each of a pixel's rays.
+    /// The guides of a frame, as [`crate::view::denoise::guides`] has them; a dispatch for each of a pixel's rays.
     pub fn guides(&self, camera: &Camera, spp: u32, seed: u32, frame: u32) -> Result<GpuGuides> {
         let gpu = &self.scene.gpu;
         let bytes = area(camera.size) * size_of::<GpuGuide>() as u64;
@@ -195,7 +195,7 @@ impl Denoiser {
         Ok([read(&guides.layers[0])?, read(&guides.layers[1])?])
     }
 
-    /// The filtered layers, as [`crate::method::path_trace::denoise::denoise`] has them.
+    /// The filtered layers, as [`crate::view::denoise::denoise`] has them.
     pub fn denoise(&self, layers: &LayerImages, guides: &GpuGuides) -> Result<LayerImages> {
         let [diffuse, glossy] = &guides.layers;
         Ok(LayerImages {

@@ -4,7 +4,6 @@
 //! ([`crate::scene::film`]), over all that the filter reaches.
 //! In: world, camera. Out: linear radiance a layer; their sum is the full image.
 
-pub mod denoise;
 pub mod denoise_gpu;
 pub mod gpu;
 mod row;

@@ -1,6 +1,5 @@
 //! Path tracing in the table of methods.
 
-use super::denoise::{DenoiseParams, denoise, guides};
 use super::denoise_gpu::Denoiser;
 use super::gpu::PathTracer;
 use super::{PathTraceParams, path_trace, path_trace_full};
@@ -13,6 +12,7 @@ use crate::scene::Scene;
 use crate::scene::film::Filter;
 use crate::transport::path::PathParams;
 use crate::view::View;
+use crate::view::denoise::{DenoiseParams, denoise, guides};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -124,7 +124,13 @@ impl Renderer for OnCpu<'_> {
         if self.params.layers == LayerChoice::Full {
             let full = path_trace_full(world, camera, &params, seed, *frame, progress);
             clock.lap("path_trace");
-            return Ok(Frame { picture: Picture::Full(full), passes: clock.laps, unserved: None, inspected: None });
+            return Ok(Frame {
+                picture: Picture::Full(full),
+                passes: clock.laps,
+                unserved: None,
+                counts: Vec::new(),
+                inspected: None,
+            });
         }
         let mut layers = path_trace(world, camera, &params, seed, *frame, progress);
         clock.lap("path_trace");
@@ -165,7 +171,13 @@ impl Renderer for OnGpu {
         if self.layers == LayerChoice::Full {
             let full = self.tracer.full(camera, spp, seed, *frame, progress)?;
             clock.lap("path_trace");
-            return Ok(Frame { picture: Picture::Full(full), passes: clock.laps, unserved: None, inspected: None });
+            return Ok(Frame {
+                picture: Picture::Full(full),
+                passes: clock.laps,
+                unserved: None,
+                counts: Vec::new(),
+                inspected: None,
+            });
         }
         let mut layers = self.tracer.layers(camera, spp, seed, *frame, progress)?;
         clock.lap("path_trace");

@@ -454,6 +454,7 @@ mod tests {
             ("image-space-gather", &["supersample=0", "samples=0", "search_samples=0", "plane_sigma=0", "max_radius=1e9"]),
             ("lightmap-rt", &["supersample=0", "samples=0", "bounces=0"]),
             ("light-field-probes", &["supersample=0", "samples=0", "direct_samples=65537", "thickness=-1", "search=all"]),
+            ("many-light", &["supersample=0", "vpls=0", "bounces=0", "min_cut=1", "max_exponent=0", "clamp=0", "sampling=some"]),
             ("path-trace", &["levels=100", "despeckle=25", "normal_power=-1"]),
         ] {
             for set in sets {

@@ -1,4 +1,4 @@
-//! Denoiser of path-traced frames of few samples: an edge-avoiding à-trous wavelet filter a layer.
+//! Denoiser of frames of few samples: an edge-avoiding à-trous wavelet filter a layer.
 //!
 //! *Sources*: Dammertz et al. 2010 (five levels of a 5 x 5 B3 spline with holes, weights from normal, depth and albedo); the
 //! colour's own edge stop is that of Schied et al. 2017, relative to the noise that the pixel's neighbourhood shows, since no earlier frame

@@ -1,0 +1,95 @@
+//! `render-path --method many-light` from the command line.
+
+mod folder;
+
+use folder::Folder;
+use reprobe::base::math::Rgb;
+use reprobe::io::ExrImage;
+use serde_json::Value;
+
+/// A room with a plate of metal just above its floor, so that hardly anything stands in the way of indirect light.
+const SCENE: &str = r#"<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="75"/>
+      <transform name="to_world"><lookat origin="0, 0, 1.7" target="0, -0.4, 0" up="0, 1, 0"/></transform>
+      <film type="hdrfilm"><integer name="width" value="36"/><integer name="height" value="24"/></film></sensor>
+    <bsdf type="twosided" id="wall"><bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.5, 0.3"/></bsdf></bsdf>
+    <bsdf type="twosided" id="metal"><bsdf type="roughconductor"><float name="alpha" value="0.25"/></bsdf></bsdf>
+    <shape type="cube" id="room"><transform name="to_world"><scale value="2"/></transform><ref id="wall"/></shape>
+    <shape type="rectangle" id="plate"><transform name="to_world"><rotate x="1" angle="-90"/><translate y="-1.9"/></transform><ref id="metal"/></shape>
+    <emitter type="point"><point name="position" x="0" y="1.5" z="0"/><rgb name="intensity" value="4"/></emitter>
+    </scene>"#;
+const LIGHTS: &str = r#"{"fps": 1, "scene_lights": false,
+    "lights": [{"type": "point", "intensity": [4, 4, 4],
+                "keyframes": [{"time": 0, "position": [-1.2, 1, 0.5]}, {"time": 2, "position": [1.2, 1, 0.5]}]}],
+    "objects": [{"type": "box", "size": [0.5, 0.5, 0.5], "albedo": [0.9, 0.1, 0.1],
+                 "keyframes": [{"time": 0, "position": [-0.5, -1, -0.5]}, {"time": 2, "position": [0.5, -1, -0.5]}]}]}"#;
+const PATH: &str = r#"{"fov": 75, "size": [36, 24], "frames": [{"origin": [0, 0, 1.7], "target": [0, -0.4, 0]}]}"#;
+const RENDER: &str = "render-path scene.xml --path path.json --method many-light";
+
+fn layer(f: &Folder, frame: &str, name: &str) -> Vec<Rgb> {
+    let path = f.at(frame);
+    ExrImage::read(&path).unwrap().rgb(&path, name).unwrap()
+}
+
+/// Means of squares of 6 x 4 pixels: of less noise than pixels.
+fn squares(pixels: &[Rgb]) -> Vec<Rgb> {
+    let square = |k: usize| {
+        let at = |i: usize| pixels[(k / 6 * 4 + i / 6) * 36 + k % 6 * 6 + i % 6];
+        (0..24).map(at).sum::<Rgb>() / 24.0
+    };
+    (0..36).map(square).collect()
+}
+
+fn timings(f: &Folder, folder: &str) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(f.at(folder).join("timings.json")).unwrap()).unwrap()
+}
+
+/// Where hardly anything blocks indirect light, a frame is the path tracer's, at the same number of bounces, but for what Phong lobes in place
+/// of microfacets do to the plate, and for the plate's own shadow.
+#[test]
+fn a_convex_room_is_as_path_traced() {
+    let f = Folder::with(SCENE, PATH);
+    f.success(&format!("{RENDER} --set bounces=3 --set direct_samples=16 --set sampling=full --set traversal=full -o frames"));
+    f.success("render-path scene.xml --path path.json --method path-trace --max-depth 4 --spp 512 --device cpu -o reference");
+    for (name, bound, bias) in [("diffuse", 0.05, 0.02), ("glossy", 0.2, 0.08)] {
+        let [ours, theirs] = ["frames", "reference"].map(|folder| squares(&layer(&f, &format!("{folder}/0000.exr"), name)));
+        let size = theirs.iter().map(|c| c.y).sum::<f32>() / 36.0;
+        let wrong = (ours.iter().zip(&theirs).map(|(a, b)| (a.y - b.y).powi(2)).sum::<f32>() / 36.0).sqrt();
+        let mean = ours.iter().map(|c| c.y).sum::<f32>() / 36.0;
+        assert!(size > 0.01 && wrong < bound * size, "{name}: {wrong} of {size}");
+        assert!((mean / size - 1.0).abs() < bias, "{name}: {mean}, {size}");
+    }
+    f.success(&format!("{RENDER} --set bounces=1 --set direct_samples=1 -o few"));
+    let counts = &timings(&f, "few")["frames"][0]["counts"];
+    let [points, most] = ["shading points", "most nodes"].map(|name| counts[name].as_f64().unwrap());
+    assert!(points > 10.0 && points <= 36.0 * 24.0 && most > 100.0, "{counts}");
+}
+
+#[test]
+fn lights_and_objects_move_and_any_frame_can_be_made_alone() {
+    let f = Folder::with(SCENE, PATH);
+    std::fs::write(f.at("lights.json"), LIGHTS).unwrap();
+    let quick = "--set vpls=3000 --set bounces=1 --set direct_samples=2";
+    f.success(&format!("{RENDER} --lights lights.json {quick} --threads 1 -o frames"));
+    f.success(&format!("{RENDER} --lights lights.json {quick} --threads 3 --frames 2 -o alone"));
+    let [first, last] = [0, 2].map(|i| layer(&f, &format!("frames/{i:04}.exr"), ""));
+    let mean = |half: &dyn Fn(usize) -> bool, frame: &[Rgb]| {
+        frame.iter().enumerate().filter(|(i, _)| half(i % 36)).map(|(_, c)| c.y).sum::<f32>()
+    };
+    let [left, right] = [mean(&|x| x < 18, &first), mean(&|x| x >= 18, &first)];
+    assert!(left > 1.1 * right && mean(&|x| x < 18, &last) < mean(&|x| x >= 18, &last) / 1.1, "{left} {right}");
+    let read = |path: &str| std::fs::read(f.at(path)).unwrap();
+    assert!(read("frames/0002.exr") == read("alone/0002.exr"), "a frame depends on others or on threads");
+}
+
+#[test]
+fn what_is_out_of_range_is_refused() {
+    let f = Folder::with(SCENE, PATH);
+    for set in
+        ["vpls=0", "bounces=0", "min_cut=1", "shadow_rays=17", "max_exponent=0.5", "clamp=0", "sampling=some", "traversal=half"]
+    {
+        let message = f.refusal(&format!("{RENDER} --set {set} -o no"));
+        assert!(message.contains(set.split('=').next().unwrap()), "{set}: {message}");
+    }
+    assert!(f.refusal(&format!("{RENDER} --probes p -o no")).contains("--probes: --method many-light has no use for it"));
+}
