@@ -56,7 +56,7 @@ fn a_convex_room_is_as_path_traced() {
         let size = theirs.iter().map(|c| c.y).sum::<f32>() / 36.0;
         let wrong = (ours.iter().zip(&theirs).map(|(a, b)| (a.y - b.y).powi(2)).sum::<f32>() / 36.0).sqrt();
         let mean = ours.iter().map(|c| c.y).sum::<f32>() / 36.0;
-        assert!(size > 0.01 && wrong < bound * size, "{name}: {wrong} of {size}");
+        assert!(size > 0.003 && wrong < bound * size, "{name}: {wrong} of {size}");
         assert!((mean / size - 1.0).abs() < bias, "{name}: {mean}, {size}");
     }
     f.success(&format!("{RENDER} --set bounces=1 --set direct_samples=1 -o few"));

@@ -327,7 +327,7 @@ fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
     assert!(f.refusal(&ulr).contains("--budget-ms: --method ulr has no use for it"));
     assert!(f.refusal(&path_trace("-o d --denoise --layers full")).contains("--layers full"));
     assert!(f.refusal(&command("--probes out/probes -o d --budget-ms 200")).contains("--method glossy-probes has no use"));
-    assert!(f.refusal(&command("--method ulr --probes out/probes -o d --denoise")).contains("path-trace has"));
+    assert!(f.refusal(&command("--method ulr --probes out/probes -o d --denoise")).contains("path-trace, many-light has"));
     assert!(f.refusal(&command("--method ulr --probes out/probes -o d --set supersample=0")).contains("1 to 8"));
 }
 

@@ -113,7 +113,7 @@ fn reflections_follow_a_light_that_moves_by_light_field_probes() {
     f.success(&format!(
         "{JOINED} --diffuse-probes transport --lights lights.json --samples 32 --set direct_samples=32 --diffuse-set bounces=16 -o frames"
     ));
-    f.success(&format!("{RENDER} --probes transport --lights lights.json -o own"));
+    f.success(&format!("{RENDER} --probes transport --lights lights.json --set bounces=16 -o own"));
     f.success(
         "render-path scene.xml --path path.json --method path-trace --spp 256 --lights lights.json --device cpu -o reference",
     );

@@ -115,11 +115,27 @@ pub fn plan(of: &Evaluate, cx: &Context) -> Result<Plan> {
     // A stage follows what it reads: those that several variants share were planned with the first.
     plan.bakes.sort_by_key(|p| BAKES.iter().position(|command| *command == p.stage.command()));
     if of.reference.is_none() {
-        let stage = pipeline.reference(&of.reference_folder()).into();
+        let lights = common_lights(&plan.frames)?;
+        let stage = RenderPath { lights, ..pipeline.reference(&of.reference_folder()) }.into();
         // Not the samples of a path-traced method, whose errors would be the reference's.
         plan.reference = Some(Planned { stage, seed: cx.seed.wrapping_add(1), users: Vec::new() });
     }
     Ok(plan)
+}
+
+/// The lights under which all frames are rendered: those of a reference that they can be measured by.
+fn common_lights(frames: &[Planned]) -> Result<Option<PathBuf>> {
+    let of = |planned: &Planned| match &planned.stage {
+        Stage::RenderPath(render) => render.lights.clone(),
+        _ => None,
+    };
+    let first = frames.first().and_then(of);
+    match frames.iter().all(|planned| of(planned) == first) {
+        true => Ok(first),
+        false => Err(Error::Request(
+            "--lights: one reference serves frames of the same lights alone; give all variants the same".into(),
+        )),
+    }
 }
 
 /// The frames of a variant.
@@ -286,6 +302,17 @@ mod tests {
             let message = evaluate(&[variant], &[]).plan(&context()).err().unwrap().to_string();
             assert!(message.starts_with(expected), "{message}");
         }
+    }
+
+    #[test]
+    fn the_reference_has_the_frames_lights() {
+        let lit = ["a=path-trace,--spp=4,--lights=l.json", "b=many-light,--lights=l.json"];
+        let Stage::RenderPath(reference) = plan(&evaluate(&lit, &[]), &context()).unwrap().reference.unwrap().stage else {
+            panic!()
+        };
+        assert_eq!(reference.lights, Some("l.json".into()));
+        let message = plan(&evaluate(&[lit[0], "b=path-trace,--spp=8"], &[]), &context()).err().unwrap().to_string();
+        assert!(message.contains("the same"), "{message}");
     }
 
     #[test]
