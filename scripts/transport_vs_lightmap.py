@@ -45,29 +45,40 @@ def irradiance(path, pixels, back):
     return result
 
 
-def relight(args, folder, *more):
+def receivers(folder):
+    """Pixel of each receiver, and whether it is on the back."""
+    words = channels(os.path.join(folder, "receivers.exr"))["pixel"].ravel()
+    words = words[: json.load(open(os.path.join(folder, "set.json")))["receivers"]]
+    return words & 0x7FFFFFFF, words >> 31 == 1
+
+
+def relight(scene, folder, *options, frame=0):
+    """E of a frame at receivers, N x 3, and the width of the atlas."""
     with tempfile.TemporaryDirectory() as temporary:
-        command = [os.environ.get("REPROBE", "reprobe"), "relight", args.scene, "--probes", folder, "-o", temporary, "--quiet",
-                   "--set", f"map_samples={args.samples}", *more]
+        command = [os.environ.get("REPROBE", "reprobe"), "relight", scene, "--probes", folder, "-o", temporary, "--quiet", *options]
         subprocess.run(command, check=True)
-        pixel = channels(os.path.join(folder, "receivers.exr"))["pixel"].ravel()
-        count = json.load(open(os.path.join(folder, "set.json")))["receivers"]
-        pixels, back = pixel[:count] & 0x7FFFFFFF, pixel[:count] >> 31 == 1
-        return irradiance(os.path.join(temporary, "0000.exr"), pixels, back), pixels, back
+        file = os.path.join(temporary, f"{frame:04d}.exr")
+        return irradiance(file, *receivers(folder)), channels(file)["irradiance.R"].shape[1]
 
 
-def halves(folder):
-    """Half floats of the operator."""
-    total = 0
-    for name in sorted(os.listdir(folder)):
-        if name[0].isdigit() and name.endswith(".exr"):
-            index = channels(os.path.join(folder, name))["index"].ravel()
-            at, (bake, terms) = 1, halves.bake
-            for _ in range(index[0]):
-                receivers, probes, rank = (int(n) for n in index[at : at + 3])
-                total += rank * (probes * terms + receivers * bake)
-                at += 3 + receivers + probes
-    return total
+def clusters(folder):
+    """Of each cluster its receivers, and its numbers of probes and of coefficients."""
+    for name in sorted(n for n in os.listdir(folder) if n[0].isdigit() and n.endswith(".exr")):
+        index = channels(os.path.join(folder, name))["index"].ravel().astype(int)
+        at = 1
+        for _ in range(index[0]):
+            count, probes, rank = index[at : at + 3]
+            yield index[at + 3 : at + 3 + count], probes, rank
+            at += 3 + count + probes
+
+
+def described(folder):
+    """set.json, the probes that take part, and half floats of the operator."""
+    bake = json.load(open(os.path.join(folder, "set.json")))
+    params, places = bake["bake"], bake["places"]
+    numbers, terms = (4 if params["receiver"] == "sh1" else 1, (params["sh_order"] + 1) ** 2)
+    halves = sum(rank * (probes * terms + len(members) * numbers) for members, probes, rank in clusters(folder))
+    return bake, len(places["positions"]) - len(places.get("blocked", [])), halves
 
 
 def main():
@@ -81,20 +92,19 @@ def main():
     args = parser.parse_args()
     print("probes order radius receivers      MB     RMS  trimmed    mean   interpolation")
     for folder in args.transport:
-        direct, pixels, back = relight(args, folder, "--set", "bounces=0")
-        found, _, _ = relight(args, folder, "--set", f"bounces={args.bounces}")
+        samples = f"map_samples={args.samples}"
+        direct, _ = relight(args.scene, folder, "--set", samples, "--set", "bounces=0")
+        found, _ = relight(args.scene, folder, "--set", samples, "--set", f"bounces={args.bounces}")
+        pixels, back = receivers(folder)
         straight = irradiance(args.direct, pixels, back) if args.direct else direct
         indirect = irradiance(args.reference, pixels, back) - straight
         squares = ((found - direct - indirect) ** 2).sum(-1)
         size = (indirect**2).sum(-1).mean()
         kept = np.sort(squares)[: int(0.99 * len(squares))]
-        bake = json.load(open(os.path.join(folder, "set.json")))
-        params, places = bake["bake"], bake["places"]
-        halves.bake = (4 if params["receiver"] == "sh1" else 1, (params["sh_order"] + 1) ** 2)
-        probes = len(places["positions"]) - len(places.get("blocked", []))
+        bake, probes, halves = described(folder)
         mean = (found - direct).mean() / indirect.mean() - 1
-        print(f"{probes:6d} {params['sh_order']:5d} {bake['radius']:6.2f} {len(pixels):9d} {2e-6 * halves(folder):7.2f}  "
-              f"{np.sqrt(squares.mean() / size):.4f}   {np.sqrt(kept.mean() / size):.4f}  {mean:+.4f}   {params['interpolation']}", flush=True)
+        print(f"{probes:6d} {bake['bake']['sh_order']:5d} {bake['radius']:6.2f} {len(pixels):9d} {2e-6 * halves:7.2f}  "
+              f"{np.sqrt(squares.mean() / size):.4f}   {np.sqrt(kept.mean() / size):.4f}  {mean:+.4f}   {bake['bake']['interpolation']}", flush=True)
 
 
 if __name__ == "__main__":
