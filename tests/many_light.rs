@@ -1,10 +1,11 @@
 //! `render-path --method many-light` from the command line.
 
 mod folder;
+mod layers;
 
 use folder::Folder;
+use layers::{layer, squares};
 use reprobe::base::math::Rgb;
-use reprobe::io::ExrImage;
 use serde_json::Value;
 
 /// A room with a plate of metal just above its floor, so that hardly anything stands in the way of indirect light.
@@ -25,20 +26,6 @@ const LIGHTS: &str = r#"{"fps": 1, "scene_lights": false,
                  "keyframes": [{"time": 0, "position": [-0.5, -1, -0.5]}, {"time": 2, "position": [0.5, -1, -0.5]}]}]}"#;
 const PATH: &str = r#"{"fov": 75, "size": [36, 24], "frames": [{"origin": [0, 0, 1.7], "target": [0, -0.4, 0]}]}"#;
 const RENDER: &str = "render-path scene.xml --path path.json --method many-light";
-
-fn layer(f: &Folder, frame: &str, name: &str) -> Vec<Rgb> {
-    let path = f.at(frame);
-    ExrImage::read(&path).unwrap().rgb(&path, name).unwrap()
-}
-
-/// Means of squares of 6 x 4 pixels: of less noise than pixels.
-fn squares(pixels: &[Rgb]) -> Vec<Rgb> {
-    let square = |k: usize| {
-        let at = |i: usize| pixels[(k / 6 * 4 + i / 6) * 36 + k % 6 * 6 + i % 6];
-        (0..24).map(at).sum::<Rgb>() / 24.0
-    };
-    (0..36).map(square).collect()
-}
 
 fn timings(f: &Folder, folder: &str) -> Value {
     serde_json::from_str(&std::fs::read_to_string(f.at(folder).join("timings.json")).unwrap()).unwrap()

@@ -1,10 +1,11 @@
 //! `bake-transport`, `relight` and `render-path --method radiance-probes`.
 
 mod folder;
+mod layers;
 
 use folder::Folder;
+use layers::{layer, squares};
 use reprobe::base::math::Rgb;
-use reprobe::io::ExrImage;
 
 /// A closed room with walls of two colours and a block in it.
 const SCENE: &str = r#"<scene version="3.0.0">
@@ -36,11 +37,6 @@ fn folder() -> Folder {
     f
 }
 
-fn layer(f: &Folder, frame: &str, name: &str) -> Vec<Rgb> {
-    let path = f.at(frame);
-    ExrImage::read(&path).unwrap().rgb(&path, name).unwrap()
-}
-
 fn files(f: &Folder, folder: &str) -> Vec<(String, Vec<u8>)> {
     let mut list: Vec<_> = std::fs::read_dir(f.at(folder))
         .unwrap()
@@ -50,15 +46,6 @@ fn files(f: &Folder, folder: &str) -> Vec<(String, Vec<u8>)> {
         .collect();
     list.sort();
     list
-}
-
-/// Means of squares of 6 x 4 pixels: of less noise than pixels.
-fn squares(pixels: &[Rgb]) -> Vec<Rgb> {
-    let square = |k: usize| {
-        let at = |i: usize| pixels[(k / 6 * 4 + i / 6) * 36 + k % 6 * 6 + i % 6];
-        (0..24).map(at).sum::<Rgb>() / 24.0
-    };
-    (0..36).map(square).collect()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 // Twin of src/method/lightmap_rt/mod.rs: light_along.
 // The mean of what the rays of follow.wgsl have found.
 
-// #include "lightmap_rt/lightmap_rt.wgsl"
+// #include "shared/pixel_run.wgsl"
 
 @group(0) @binding(1) var<storage, read> sums: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> glossy: array<vec4<f32>>;

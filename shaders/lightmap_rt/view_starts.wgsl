@@ -1,7 +1,7 @@
 // Twin of src/method/lightmap_rt/mod.rs: lightmap_rt.
 // Where the rays of follow.wgsl leave a view's pixels.
 
-// #include "lightmap_rt/lightmap_rt.wgsl"
+// #include "shared/pixel_run.wgsl"
 // #include "shared/random.wgsl"
 // #include "shared/camera_ray.wgsl"
 // #include "shared/view.wgsl"

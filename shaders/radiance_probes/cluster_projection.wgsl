@@ -1,4 +1,4 @@
-// Twin of src/method/radiance_probes/operator.rs: project.
+// Twin of src/method/radiance_probes/clusters.rs: project.
 // The light of clusters' spaces: a workgroup a row of a cluster's projection.
 
 struct Params {

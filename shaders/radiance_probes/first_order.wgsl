@@ -4,28 +4,14 @@
 
 // #include "shared/path.wgsl"
 // #include "shared/camera_ray.wgsl"
+// #include "shared/pixel_run.wgsl"
 // #include "shared/view.wgsl"
-
-struct Params {
-    camera: Camera,
-    seed: u32,
-    frame: u32,
-    // A run of the view's pixels.
-    first_pixel: u32,
-    pixels: u32,
-    // Of direct light, of each pixel.
-    samples: u32,
-    padding0: u32,
-    padding1: u32,
-    padding2: u32,
-}
 
 // Directions by which light of first order is taken in.
 const DIRECTIONS: u32 = 16u;
 // Of a pixel's random stream: direct light of the glossy layer.
 const BRANCH: u32 = 1u;
 
-@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> view: array<Pixel>;
 @group(0) @binding(2) var<storage, read_write> shading: array<Shading>;
 @group(0) @binding(3) var<storage, read_write> glossy: array<vec4<f32>>;

@@ -1,4 +1,4 @@
-// Twin of src/method/radiance_probes/operator.rs: reconstruct.
+// Twin of src/method/radiance_probes/clusters.rs: reconstruct.
 // The light of receivers from that of their clusters' spaces.
 
 struct Member {

@@ -3,23 +3,9 @@
 
 // #include "shared/path.wgsl"
 // #include "shared/camera_ray.wgsl"
+// #include "shared/pixel_run.wgsl"
 // #include "shared/view.wgsl"
 
-struct Params {
-    camera: Camera,
-    seed: u32,
-    frame: u32,
-    // A run of the view's pixels.
-    first_pixel: u32,
-    pixels: u32,
-    // Of each pixel.
-    samples: u32,
-    padding0: u32,
-    padding1: u32,
-    padding2: u32,
-}
-
-@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> view: array<Pixel>;
 @group(0) @binding(2) var<storage, read_write> shading: array<Shading>;
 

@@ -1,4 +1,4 @@
-// A run of a view's pixels, from which rays are followed. Twin: src/method/lightmap_rt/mod.rs.
+// A run of a view's pixels that a dispatch covers. Twin: src/gpu/view/pixel_run.rs.
 
 // #include "shared/camera.wgsl"
 

@@ -6,6 +6,7 @@ pub mod frame;
 pub(crate) mod gbuffer;
 pub(crate) mod mirror;
 pub(crate) mod mirror_light;
+pub(crate) mod pixel_run;
 
 use super::Gpu;
 use super::kernel::area;

@@ -3,35 +3,22 @@
 use super::LightmapRtParams;
 use crate::Result;
 use crate::gpu::Gpu;
-use crate::gpu::camera::{CAMERA, GpuCamera};
+use crate::gpu::camera::CAMERA;
 use crate::gpu::commands::Commands;
 use crate::gpu::follow::{PATH_START, Place, Purpose, SampleSum, Samples, most_starts};
 use crate::gpu::kernel::Kernel;
 use crate::gpu::pace::Pace;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
-use crate::gpu::spec::{KernelSpec, StructLayout, layout};
+use crate::gpu::spec::KernelSpec;
 use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
+use crate::gpu::view::pixel_run::{PIXEL_RUN, PixelRun};
 use crate::gpu::view::{PIXEL, REFLECTED};
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
 use crate::transport::World;
 use crate::transport::follow::PathStart;
 use crate::view::gbuffer::GLOSSY;
-use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
-
-/// `Params` of lightmap_rt.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    camera: GpuCamera,
-    seed: u32,
-    frame: u32,
-    first_pixel: u32,
-    pixels: u32,
-    samples: u32,
-    padding: [u32; 3],
-}
 
 /// Where rays leave the view's pixels.
 pub(crate) const VIEW_STARTS: KernelSpec = KernelSpec {
@@ -40,7 +27,7 @@ pub(crate) const VIEW_STARTS: KernelSpec = KernelSpec {
     workgroup: [64, 1],
     scene: false,
     bindings: &[("params", Uniform), ("view", Read), ("starts", ReadWrite)],
-    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &PATH_START],
+    structs: &[&PIXEL_RUN, &CAMERA, &PIXEL, &REFLECTED, &PATH_START],
 };
 /// The mean of what they find.
 pub(crate) const MEAN_LIGHT: KernelSpec = KernelSpec {
@@ -49,9 +36,8 @@ pub(crate) const MEAN_LIGHT: KernelSpec = KernelSpec {
     workgroup: [64, 1],
     scene: false,
     bindings: &[("params", Uniform), ("sums", Read), ("glossy", ReadWrite)],
-    structs: &[&PARAMS, &CAMERA],
+    structs: &[&PIXEL_RUN, &CAMERA],
 };
-const PARAMS: StructLayout = layout!(Params as "Params" { camera, seed, frame, first_pixel, pixels, samples });
 
 /// Renders frames on a device.
 pub struct LightmapRt {
@@ -93,15 +79,7 @@ impl LightmapRt {
             let mut pixel = 0;
             while pixel < pixels {
                 let run = (pace.pieces() / samples.max(1) as usize).clamp(1, most_starts(&scene)).min(pixels - pixel);
-                let params = Params {
-                    camera: camera.into(),
-                    seed,
-                    frame,
-                    first_pixel: pixel as u32,
-                    pixels: run as u32,
-                    samples,
-                    padding: [0; 3],
-                };
+                let params = PixelRun::new(camera, [seed, frame], (pixel as u32, run as u32), samples);
                 let params = gpu.uniform("the rays' parameters", &params)?;
                 let list = gpu.output("starts of rays", (run * size_of::<PathStart>()) as u64)?;
                 let sums = gpu.output("sums over rays", (run * size_of::<SampleSum>()) as u64)?;

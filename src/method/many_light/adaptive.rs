@@ -6,7 +6,7 @@
 //! *Ours*, where the text is silent: light is without albedo, and counts relative to the coarsest grid's mean, which is taken for middle grey
 //! (.18), so that the threshold has no unit; parents of other materials weigh nothing, and a pixel without a parent that fits is sampled.
 
-use super::gather::Received;
+use super::arrival::Received;
 use super::params::{ManyLightParams, Sampling};
 use crate::view::gbuffer::{GBuffer, Pixel};
 use rayon::prelude::*;

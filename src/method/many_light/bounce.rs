@@ -2,9 +2,10 @@
 //!
 //! *Paper*: for more bounces, light is gathered at the lights as at a view's points, and the lobes that come of it are filtered to one.
 
+use super::arrival::Received;
 use super::cuts::Forest;
 use super::emit::{Emission, Site, direct};
-use super::gather::{Gather, Received};
+use super::gather::Gather;
 use super::params::ManyLightParams;
 use super::points::Places;
 use super::tree::{Spot, Tree};

@@ -5,10 +5,10 @@
 //! The magnitude of a lobe is the directional albedo of the material's non-diffuse lobes times the irradiance across the light's direction: a
 //! narrow lobe then carries the energy that the material reflects.
 
-use super::gather::{Arrival, Received};
+use super::arrival::{Arrival, Received};
 use super::lobe::{Lobe, LobeSum, exponent_of};
 use super::params::ManyLightParams;
-use super::points::Place;
+use super::place::Place;
 use super::tree::Spot;
 use crate::base::math::{Rgb, hash_words, luminance, reflect};
 use crate::material::Surface;

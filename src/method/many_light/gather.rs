@@ -4,6 +4,7 @@
 //! whether to go on to its children leaves out the patch's cosine, which is that of the mean of its normals and bounds nothing; what light is
 //! multiplied with has it, by the mean normal as short as it is, so that a far cluster sends what all its lights would.
 
+use super::arrival::{Arrival, Received};
 use super::cuts::Forest;
 use super::disc;
 use super::emit::Emission;
@@ -39,24 +40,6 @@ pub struct Node {
     lobe: Lobe,
     /// Its lights in the tree's order: the first, and how many.
     pub lights: [u32; 2],
-}
-
-/// Light that arrives from a node, or from a part of it.
-pub struct Arrival {
-    /// Unit direction towards it.
-    pub direction: Vec3,
-    /// Solid angle, its cosine included.
-    pub solid_angle: f32,
-    /// Radiance.
-    pub radiance: Rgb,
-}
-
-/// What a receiver makes of light: adds up.
-pub trait Received: Default + Copy {
-    /// With `scale` times the other.
-    fn add(&mut self, other: &Self, scale: f32);
-    /// How much it is, for choosing among nodes.
-    fn weight(&self) -> f32;
 }
 
 /// The light of a frame, ready to be gathered.

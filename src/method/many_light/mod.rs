@@ -11,6 +11,7 @@
 //! In: a world and a view. Out: the diffuse and glossy layers, linear radiance.
 
 pub mod adaptive;
+pub mod arrival;
 pub mod bounce;
 pub mod cuts;
 pub mod disc;
@@ -18,6 +19,7 @@ pub mod emit;
 pub mod gather;
 pub mod lobe;
 mod params;
+pub mod place;
 pub mod points;
 pub mod repel;
 mod row;

@@ -6,10 +6,10 @@
 //! inside of its furniture; everywhere, if the scene has no sensor, or hardly any side can be joined with it. Both sides count of materials
 //! that have two.
 
+use super::place::Place;
 use super::repel::{point, spread};
 use super::settle::{Sample, settle};
 use crate::base::math::{Basis, hash_words};
-use crate::base::ray::Hit;
 use crate::lightmap::visible::facing;
 use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
@@ -25,29 +25,6 @@ const STEPS: u32 = 3;
 const SAMPLES: u32 = 16;
 /// Most candidates for a light.
 const MOST_DRAWS: u32 = 16 * SAMPLES;
-
-/// A light's place, which follows its triangle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
-    /// Triangle.
-    pub triangle: u32,
-    /// Weights of its second and third vertex.
-    pub barycentric: Vec2,
-    /// Whether it is the side that the shading normal points away from.
-    pub back: bool,
-}
-
-impl Place {
-    /// The surface there in a frame's world.
-    pub fn surface(&self, world: &World) -> Surface {
-        world.surface(&Hit { t: 0.0, triangle: self.triangle, u: self.barycentric.x, v: self.barycentric.y })
-    }
-
-    /// 1 on the side of the shading normal, -1 behind.
-    pub fn side(&self) -> f32 {
-        if self.back { -1.0 } else { 1.0 }
-    }
-}
 
 /// Lights and what they stand for.
 #[derive(Debug, Clone, Default, PartialEq)]

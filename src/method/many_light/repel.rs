@@ -3,7 +3,7 @@
 //! *Ours*: forces end at [`REACH`] spacings, act between points that face alike, and fall linearly; a point goes along its triangle, over an
 //! edge into the next one of the same object where the surface is not folded back by more than a third of a turn, and else stops at the edge.
 
-use super::points::Place;
+use super::place::Place;
 use crate::lightmap::adjacency::{Adjacency, NONE, adjacency};
 use crate::scene::Geometry;
 use glam::{Quat, Vec2, Vec3};

@@ -1,8 +1,9 @@
 //! Many lights in the table of methods.
 
 use super::adaptive::{Filled, Sampler};
+use super::arrival::Received;
 use super::bounce::{Structure, light, sites};
-use super::gather::{Gather, Received};
+use super::gather::Gather;
 use super::params::ManyLightParams;
 use super::points::{Places, place};
 use super::shade::{Light, Shading};

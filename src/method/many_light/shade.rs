@@ -4,9 +4,10 @@
 //! albedo towards the viewer and the exponent of their roughness; what is gathered leaves both albedos out, so that textures stay sharp where
 //! light is interpolated.
 
+use super::arrival::{Arrival, Received};
 use super::bounce::Structure;
 use super::emit::{Site, exponent};
-use super::gather::{Arrival, Gather, Received};
+use super::gather::Gather;
 use super::lobe::density;
 use super::params::ManyLightParams;
 use crate::base::math::{Rgb, hash_words, luminance, reflect};

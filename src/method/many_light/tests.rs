@@ -3,11 +3,13 @@
 //! The reference is a path tracer whose indirect rays ignore what blocks them: a ray counts all surfaces that it passes.
 
 use super::adaptive::Sampler as Pixels;
+use super::arrival::{Arrival, Received};
 use super::bounce::{Structure, light, sites};
 use super::emit::{Site, direct};
-use super::gather::{Arrival, Gather, Received};
+use super::gather::Gather;
 use super::params::{ManyLightParams, Sampling, Traversal};
-use super::points::{Place, place};
+use super::place::Place;
+use super::points::place;
 use super::shade::{Light, Shading};
 use crate::base::clock::Clock;
 use crate::base::math::{Basis, Rgb, hash_words, luminance, reflect};

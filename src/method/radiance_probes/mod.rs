@@ -4,10 +4,11 @@
 //! What a receiver sees is interpolated from the spherical harmonics of the probes around it, direction by direction, from those alone that
 //! see the same point (§3.2). That is linear in the probes' radiance, and knows neither lights nor colours: it is baked ([`transport`]) and
 //! compressed ([`compress`]). A frame lights the surfaces, gathers them at the probes ([`relight`]) and takes them from there to the receivers
-//! ([`operator`], [`light`]).
+//! ([`operator`], [`clusters`], [`light`]).
 
 pub mod bake;
 pub mod cluster;
+pub mod clusters;
 pub mod compress;
 pub mod frame_map;
 pub mod gpu;

@@ -64,6 +64,11 @@ pub fn shared_files(folder: &Path, has_volume: bool) -> Vec<PathBuf> {
     names[..if has_volume { 3 } else { 2 }].iter().map(|name| folder.join(name)).collect()
 }
 
+/// All files of a folder of so many groups, in the order of [`TransportSet::files`].
+fn all_files(folder: &Path, has_volume: bool, groups: usize) -> Vec<PathBuf> {
+    shared_files(folder, has_volume).into_iter().chain((0..groups).map(|i| numbered(folder, i))).collect()
+}
+
 /// Where the probes stand that take part.
 pub fn positions(places: &Places) -> Vec<Vec3> {
     places.used().into_iter().map(|i| places.position(i)).collect()
@@ -79,7 +84,7 @@ impl TransportSet {
         let set = read_set_of::<Self>(folder, Self::STAGE)?;
         let set = set.ok_or_else(|| Error::input(&path, "is not of transport: expected a folder that bake-transport wrote"))?;
         let grid = set.volume.map(|v| v.grid);
-        let is_grid = |g: Grid| g.low.is_finite() && g.spacing > 0.0 && g.counts.iter().all(|n| (1..=1 << 22).contains(n));
+        let is_grid = |g: Grid| g.low.is_finite() && g.spacing > 0.0 && g.has_points();
         let groups = set.volume.map_or(0, |v| v.groups);
         let has_files = set.files.len() >= shared_files(folder, grid.is_some()).len() + groups;
         if !(set.radius > 0.0 && set.radius.is_finite() && has_files && grid.is_none_or(is_grid)) {
@@ -91,15 +96,13 @@ impl TransportSet {
 
     /// All files of the folder, in the order of [`Self::files`].
     pub fn paths(&self, folder: &Path) -> Vec<PathBuf> {
-        let shared = shared_files(folder, self.volume.is_some());
-        let groups = self.files.len().saturating_sub(shared.len());
-        shared.into_iter().chain((0..groups).map(|i| numbered(folder, i))).collect()
+        let shared = shared_files(folder, self.volume.is_some()).len();
+        all_files(folder, self.volume.is_some(), self.files.len().saturating_sub(shared))
     }
 
-    /// Hashes of shared files and those of so many groups as they are.
+    /// Hashes of the files of so many groups, and those that they share, as they are.
     pub fn hashes(folder: &Path, has_volume: bool, groups: usize) -> Result<Vec<String>> {
-        let all = shared_files(folder, has_volume).into_iter().chain((0..groups).map(|i| numbered(folder, i)));
-        all.map(|file| hash_file(&file)).collect()
+        all_files(folder, has_volume, groups).iter().map(|file| hash_file(file)).collect()
     }
 }
 

@@ -3,10 +3,10 @@
 //! Its points keep the radiance around them to second order, from which all but about a hundredth of irradiance comes, whichever way a
 //! surface faces (Ramamoorthi and Hanrahan 2001). *Ours*: a point of the grid that the scene hides from a surface gives it no light.
 
+use super::clusters::{project, reconstruct};
 use super::compress::Cluster;
 use super::harmonics::{Harmonics, cosine_factor, terms};
 use super::interpolate::{Interpolation, Interpolator, MOST_NUMBERS, Row};
-use super::operator::{project, reconstruct};
 use super::seen::Ground;
 use crate::base::math::{Rgb, spread_over_sphere};
 use crate::base::ray::Ray;
@@ -60,6 +60,11 @@ impl Grid {
         let counts = counts.as_uvec3();
         let rest = high - low - (counts - 1).as_vec3() * spacing;
         Ok(Self { low: low + rest / 2.0, spacing, counts: counts.to_array() })
+    }
+
+    /// Whether there are points, and not more than a grid may have.
+    pub fn has_points(&self) -> bool {
+        (1.0..=MOST_POINTS).contains(&self.counts.iter().map(|&n| f64::from(n)).product())
     }
 
     /// How many points there are.

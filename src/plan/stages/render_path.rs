@@ -113,6 +113,8 @@ pub struct Resolved {
     pub method: &'static Method,
     /// Its parameters.
     pub parameters: Value,
+    /// Whose diffuse light frames have, where it is not the method's own.
+    pub joined: Option<Joined>,
 }
 
 /// What was read.
@@ -175,7 +177,7 @@ impl RenderPath {
                 return Err(Error::Request(format!("--method {} needs --{option}, written by {stage}", method.name)));
             }
         }
-        self.joined()?;
+        let joined = self.joined()?;
         let budgets = [self.budget_ms.is_some(), self.match_time.is_some(), self.spp.is_some(), self.samples.is_some()];
         if budgets.into_iter().filter(|given| *given).count() > 1 {
             return Err(Error::Request("--budget-ms, --match-time, --spp, --samples: expected one of them".into()));
@@ -193,7 +195,7 @@ impl RenderPath {
             paper: self.paper,
             set: self.set.clone(),
         };
-        Ok(Resolved { method, parameters: (method.parameters)(&options)? })
+        Ok(Resolved { method, parameters: (method.parameters)(&options)?, joined })
     }
 
     /// Whose diffuse light frames have, where it is not the method's own.
@@ -224,14 +226,14 @@ impl RenderPath {
 
     /// The method's name, and the samples that its frames have, where they have a number of them that is not left to a budget.
     pub fn samples(&self) -> Result<(&'static str, Option<u32>)> {
-        let Resolved { method, parameters } = self.resolve()?;
+        let Resolved { method, parameters, .. } = self.resolve()?;
         let is_fixed = self.budget_ms.is_none() && self.match_time.is_none();
         Ok((method.name, method.count(&parameters).filter(|_| is_fixed)))
     }
 
     /// The texels of probes that its views want, where the method can say it; `None` elsewhere.
     pub fn served(&self, cameras: &[Camera]) -> Result<Option<Served>> {
-        let Resolved { method, parameters } = self.resolve()?;
+        let Resolved { method, parameters, .. } = self.resolve()?;
         if method.name != glossy_probes::METHOD.name {
             return Ok(None);
         }
@@ -241,9 +243,10 @@ impl RenderPath {
 
     /// Reads, renders the frames that are not finished, writes them and what they took.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
-        let Resolved { method, parameters } = self.resolve()?;
+        let Resolved { method, parameters, joined } = self.resolve()?;
         let mut timings = Timings::of(method.name);
-        let Inputs { world, animation, lightmap, curvature, provenance } = self.inputs(cx, method, &mut timings)?;
+        let Inputs { world, animation, lightmap, curvature, provenance } =
+            self.inputs(cx, (method, joined.as_ref()), &mut timings)?;
         let (path, size, frames) = (self.path.as_deref(), self.size.map(|s| s.0), self.frames.as_ref());
         let views = match &animation {
             None => views(&world.scene, path, size, frames)?,
@@ -253,7 +256,6 @@ impl RenderPath {
         let (parameters, warnings) = (method.for_scene)(parameters, &world.scene)?;
         warnings.iter().for_each(|w| cx.listener.warn(w));
         let budget = Budget::read(self.budget_ms, self.match_time.as_deref(), cx)?;
-        let joined = self.joined()?;
         let setup = Setup {
             world: &world,
             animation: animation.as_ref(),
@@ -272,7 +274,7 @@ impl RenderPath {
         render(&frames, cx, timings)
     }
 
-    fn inputs(&self, cx: &Context, method: &Method, timings: &mut Timings) -> Result<Inputs> {
+    fn inputs(&self, cx: &Context, (method, joined): (&Method, Option<&Joined>), timings: &mut Timings) -> Result<Inputs> {
         let world = if method.transmissive {
             let (scene, load_ms) = timed(|| cx.load_scene(&self.scene));
             let (world, build_ms) = timed(|| scene.map(World::new));
@@ -292,8 +294,8 @@ impl RenderPath {
                 warn_of_partial_set(folder, method, cx);
             }
         }
-        if let Some(Joined { method, probes, .. }) = self.joined()? {
-            let hash = set_hash(&probes, method.reads.probes.map_or("", |p| p.stage))?;
+        if let Some(Joined { method, probes, .. }) = joined {
+            let hash = set_hash(probes, method.reads.probes.map_or("", |p| p.stage))?;
             provenance = provenance.with_input("diffuse-probes", hash);
         }
         let curvature = match &self.curvature {

@@ -1,30 +1,16 @@
 //! Views lit by radiance of first order on a device: the twin of what [`super::super::shade`] makes of sh1.
 
 use crate::Result;
-use crate::gpu::camera::{CAMERA, GpuCamera};
+use crate::gpu::camera::CAMERA;
 use crate::gpu::commands::Commands;
 use crate::gpu::kernel::{Kernel, area};
 use crate::gpu::scene::GpuScene;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
-use crate::gpu::spec::{KernelSpec, StructLayout, layout};
-use crate::gpu::view::direct::runs;
+use crate::gpu::spec::KernelSpec;
 use crate::gpu::view::frame::Target;
+use crate::gpu::view::pixel_run::{PIXEL_RUN, PixelRun, runs};
 use crate::gpu::view::{PIXEL, REFLECTED, SHADING};
 use crate::scene::Camera;
-use bytemuck::{Pod, Zeroable};
-
-/// `Params` of first_order.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    camera: GpuCamera,
-    seed: u32,
-    frame: u32,
-    first_pixel: u32,
-    pixels: u32,
-    samples: u32,
-    padding: [u32; 3],
-}
 
 /// The kernel.
 pub(crate) const FIRST_ORDER: KernelSpec = KernelSpec {
@@ -33,9 +19,8 @@ pub(crate) const FIRST_ORDER: KernelSpec = KernelSpec {
     workgroup: [64, 1],
     scene: true,
     bindings: &[("params", Uniform), ("view", Read), ("shading", ReadWrite), ("glossy", ReadWrite)],
-    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &SHADING],
+    structs: &[&PIXEL_RUN, &CAMERA, &PIXEL, &REFLECTED, &SHADING],
 };
-const PARAMS: StructLayout = layout!(Params as "Params" { camera, seed, frame, first_pixel, pixels, samples });
 
 /// The kernel, compiled.
 pub(super) struct FirstOrder(Kernel);
@@ -57,13 +42,13 @@ impl FirstOrder {
         commands: &mut Commands,
         (camera, target): (&Camera, &Target),
         samples: u32,
-        [seed, frame]: [u32; 2],
+        seeds: [u32; 2],
     ) -> Result<()> {
         let view = &target.view;
-        for (first_pixel, pixels) in runs(area(view.size) as u32, samples) {
-            let params = Params { camera: camera.into(), seed, frame, first_pixel, pixels, samples, padding: [0; 3] };
+        for run in runs(area(view.size) as u32, samples) {
+            let params = PixelRun::new(camera, seeds, run, samples);
             let params = scene.gpu.uniform("parameters of light of first order", &params)?;
-            commands.run("glossy", &self.0, &[&params, &view.pixels, &view.shading, &target.glossy], [pixels, 1]);
+            commands.run("glossy", &self.0, &[&params, &view.pixels, &view.shading, &target.glossy], [run.1, 1]);
         }
         Ok(())
     }

@@ -75,7 +75,7 @@ pub(crate) const PROBE_RELIGHT: KernelSpec = KernelSpec {
 /// The light of clusters' spaces.
 pub(crate) const CLUSTER_PROJECTION: KernelSpec = KernelSpec {
     file: "radiance_probes/cluster_projection.wgsl",
-    twin: "src/method/radiance_probes/operator.rs: project",
+    twin: "src/method/radiance_probes/clusters.rs: project",
     workgroup: [64, 1],
     scene: false,
     bindings: &[
@@ -91,7 +91,7 @@ pub(crate) const CLUSTER_PROJECTION: KernelSpec = KernelSpec {
 /// The light of receivers.
 pub(crate) const RECONSTRUCT: KernelSpec = KernelSpec {
     file: "radiance_probes/reconstruct.wgsl",
-    twin: "src/method/radiance_probes/operator.rs: reconstruct",
+    twin: "src/method/radiance_probes/clusters.rs: reconstruct",
     workgroup: [64, 1],
     scene: false,
     bindings: &[("members", Read), ("reconstruction", Read), ("spaces", Read), ("indirect", ReadWrite)],
