@@ -2,15 +2,11 @@
 // What a run of pixels sends to the camera of light that came by way of the probes as radiance of first order: the diffuse layer, to which
 // light straight from emitters is still to be added, and the glossy one, which has it.
 
-// #include "shared/path.wgsl"
-// #include "shared/camera_ray.wgsl"
-// #include "shared/pixel_run.wgsl"
+// #include "shared/glossy_direct.wgsl"
 // #include "shared/view.wgsl"
 
 // Directions by which light of first order is taken in.
 const DIRECTIONS: u32 = 16u;
-// Of a pixel's random stream: direct light of the glossy layer.
-const BRANCH: u32 = 1u;
 
 @group(0) @binding(1) var<storage, read> view: array<Pixel>;
 @group(0) @binding(2) var<storage, read_write> shading: array<Shading>;
@@ -51,18 +47,6 @@ fn reflected(s: Surface, wo: vec3<f32>, light: array<vec3<f32>, 4>) -> vec3<f32>
     return scatter(s, to_local(s.frame, wo), to_local(s.frame, d), 0.0, vec2(0.5), query).light.value * max(irradiance, vec3(0.0));
 }
 
-// The mean of so many samples of light straight from emitters.
-fn direct(hit: Hit, wo: vec3<f32>, pixel: u32) -> vec3<f32> {
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), params.frame), pixel));
-    let branch = hash_end(hash_next(hash_next(hash_start(), stream), BRANCH));
-    var sum = vec3(0.0);
-    for (var k = 0u; k < params.samples; k++) {
-        var s = sampler_new(branch, k);
-        sum += integrate(Start(hit, wo, Query(NON_DIFFUSE, 1.0), 0.0, true), PathParams(1u, NONE), &s);
-    }
-    return sum / f32(max(params.samples, 1u));
-}
-
 @compute @workgroup_size(64)
 fn first_order(@builtin(global_invocation_id) id: vec3<u32>) {
     scene = scene_params;
@@ -85,6 +69,6 @@ fn first_order(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     shading[pixel].diffuse = taken_in(s, wo, view[pixel].n, light);
     if view[pixel].material != NOT_GLOSSY {
-        glossy[pixel] = vec4(direct(hit, wo, pixel) + reflected(s, wo, light), 0.0);
+        glossy[pixel] = vec4(glossy_direct(hit, wo, pixel) + reflected(s, wo, light), 0.0);
     }
 }

@@ -49,6 +49,20 @@ fn leaf_glossy_albedo(m: u32, wi: vec3<f32>, query: Query) -> vec3<f32> {
     }
 }
 
+// The albedo of all of them towards `wi`.
+fn bsdf_glossy_albedo(s: Surface, wi: vec3<f32>) -> vec3<f32> {
+    let root = material_u32(s.material, MATERIAL_MODEL);
+    var sum = vec3(0.0);
+    var u = 0.0;
+    for (var i = 0u; i < model_u32(root, MODEL_LEAVES); i++) {
+        let leaf = leaf_at(root, s, wi, i, &u, ALL_LOBES);
+        if leaf.share > 0.0 {
+            sum += leaf.share * leaf_glossy_albedo(leaf.model, leaf.wi, Query(NON_DIFFUSE, 1.0));
+        }
+    }
+    return sum;
+}
+
 fn principled_glossy_albedo(m: u32, wi: vec3<f32>, query: Query) -> vec3<f32> {
     let p = principled_at(m, query);
     if wi.z <= 0.0 {

@@ -84,6 +84,7 @@ impl Baked {
             Some("light-field-probes") => "--probes out/lightfield",
             Some("radiance-probes") if options.contains("--probes") => "",
             Some("radiance-probes") => "--probes out/transport",
+            Some("many-light") => "",
             Some("ulr") => "--probes out/probes --lightmap out/lightmap.exr",
             Some(_) => "--lightmap out/lightmap.exr",
             None => "--probes out/probes --lightmap out/lightmap.exr --curvature out/curvature.exr",

@@ -10,6 +10,7 @@ mod denoise;
 mod filter;
 mod frames;
 mod light_field;
+mod many_light;
 mod paths;
 mod radiance_probes;
 mod rays;
@@ -88,6 +89,7 @@ const TWICE: &[Test] = tests![
     frames::frames_are_the_cpus,
     light_field::commands_render_them,
     light_field::frames_are_the_cpus,
+    many_light::frames_are_the_cpus,
     paths::every_model_and_emitter_is_the_cpus,
     paths::a_sky_and_its_sun_are_the_cpus,
     paths::layers_and_full_images_are_the_cpus,

@@ -10,12 +10,15 @@ use crate::material::surface;
 use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gpu_gather};
 use crate::method::glossy_probes::{coverage, filter, footprint, perturb, previous, search};
 use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
+use crate::method::many_light::{
+    adaptive, bounce, disc, emit, gather as many_lights_gather, gpu as gpu_many_light, params as many_light_params,
+    shade as many_lights_shade,
+};
 use crate::method::radiance_probes::{gpu as gpu_radiance_probes, seen, shade as shade_of_radiance_probes};
 use crate::method::{image_space_gather, ulr};
 use crate::probe::{neighbors, parameter_map as qhmap};
 use crate::transport::{bvh, light_tree, path, sampler};
-use crate::view::denoise;
-use crate::view::{mirror, mirror_light};
+use crate::view::{denoise, direct, mirror, mirror_light};
 use std::f32::consts;
 use wgpu::naga::{Expression, Handle, Literal, Module};
 
@@ -129,12 +132,28 @@ fn twins(file: &str) -> Twins {
             MOST_PROBES = trace::MOST_PROBES;
             LEAST_LIGHT = probe::LEAST_LIGHT;
         },
+        "many_light/bounce.wgsl" => twins! { BOUNCE = bounce::BOUNCE; },
+        "many_light/choose_pixels.wgsl" => twins! {
+            NORMAL_POWER = adaptive::NORMAL_POWER as f32;
+            PLANE = adaptive::PLANE;
+            LEAST_WEIGHT = adaptive::LEAST_WEIGHT;
+        },
+        "many_light/expose.wgsl" => twins! { MIDDLE_GREY = adaptive::MIDDLE_GREY; },
+        "many_light/filter_lobes.wgsl" => twins! { NO_NODE = gpu_many_light::lights::NO_NODE; },
+        "many_light/gather.wgsl" => twins! {
+            MOST_SHADOW_RAYS = many_light_params::MOST_SHADOW_RAYS;
+            CONE = many_lights_gather::CONE;
+            SMALL = many_lights_gather::SMALL;
+            DISC_SIZE = disc::SIZE;
+            DISC_FAR = disc::FAR;
+        },
+        "many_light/light_pixels.wgsl" => twins! { PIXEL = many_lights_shade::PIXEL; },
+        "many_light/reflected.wgsl" => twins! { VIEWS = emit::VIEWS; },
         "path_trace/add_guides.wgsl" => twins! { ENVIRONMENT_DEPTH = denoise::FAR; },
         "path_trace/denoise.wgsl" => twins! { MIN_ALBEDO = denoise::MIN_ALBEDO; },
         "radiance_probes/fill_ring.wgsl" => twins! { CORNER = fill::CORNER; },
         "radiance_probes/first_order.wgsl" => twins! {
             DIRECTIONS = shade_of_radiance_probes::DIRECTIONS;
-            BRANCH = shade_of_radiance_probes::BRANCHES[0];
         },
         "radiance_probes/probe_relight.wgsl" => twins! { NO_RECEIVER = seen::NO_RECEIVER; },
         "radiance_probes/receiver_light.wgsl" => twins! {
@@ -146,6 +165,7 @@ fn twins(file: &str) -> Twins {
             ALBEDO_COSINES = albedo::COSINES;
             ALBEDO_ALPHAS = albedo::ALPHAS;
         },
+        "shared/glossy_direct.wgsl" => twins! { GLOSSY_BRANCH = direct::GLOSSY_BRANCH; },
         "shared/light_tree.wgsl" => twins! {
             BACK = light_tree::BACK;
             EVEN = light_tree::EVEN;

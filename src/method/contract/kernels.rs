@@ -7,6 +7,7 @@ use crate::method::glossy_probes::gpu::{coverage, fill, filter, footprint, gathe
 use crate::method::image_space_gather::gpu as image_space_gather;
 use crate::method::light_field_probes::gpu as light_field_probes;
 use crate::method::lightmap_rt::gpu as lightmap_rt;
+use crate::method::many_light::gpu::{lights as many_lights, pixels as many_light_pixels};
 use crate::method::path_trace::{denoise_gpu as denoise, gpu as path_trace};
 use crate::method::radiance_probes::gpu::{self as radiance_probes, first_order, light_map, operator};
 use crate::method::ulr::gpu as ulr;
@@ -40,6 +41,14 @@ pub(crate) const KERNELS: &[&KernelSpec] = &[
     &light_field_probes::TRACE_RAYS,
     &lightmap_rt::MEAN_LIGHT,
     &lightmap_rt::VIEW_STARTS,
+    &many_light_pixels::CHOOSE_PIXELS,
+    &many_light_pixels::EXPOSE,
+    &many_light_pixels::LIGHT_PIXELS,
+    &many_light_pixels::TALLY,
+    &many_light_pixels::VIEW_LAYERS,
+    &many_lights::BOUNCE,
+    &many_lights::FILTER_LOBES,
+    &many_lights::SAMPLE_LIGHTS,
     &first_order::FIRST_ORDER,
     &light_map::FILL_RING,
     &light_map::MAP_LIGHT,

@@ -16,13 +16,13 @@ const COARSEST: usize = 16;
 /// Distance of the pixels of bilateral sampling.
 const UNIFORM: usize = 4;
 /// What the mean of the coarsest grid's light is taken for.
-const MIDDLE_GREY: f32 = 0.18;
+pub(crate) const MIDDLE_GREY: f32 = 0.18;
 /// Power of the cosine between normals (Sloan et al. 2007 leave it open).
-const NORMAL_POWER: i32 = 32;
+pub(crate) const NORMAL_POWER: i32 = 32;
 /// Distance from a parent's tangent plane at which it weighs half, as a fraction of depth.
-const PLANE: f32 = 0.01;
+pub(crate) const PLANE: f32 = 0.01;
 /// Sum of weights below which no parent fits.
-const LEAST_WEIGHT: f32 = 0.02;
+pub(crate) const LEAST_WEIGHT: f32 = 0.02;
 
 /// What is asked of pixels.
 pub struct Sampler<'a, V> {
@@ -49,16 +49,11 @@ impl<V: Received + Send + Sync> Sampler<'_, V> {
     pub fn fill(&self) -> Filled<V> {
         let count = self.view.pixels.len();
         let mut filled = Filled { values: vec![V::default(); count], sampled: vec![false; count] };
-        let coarsest = match self.params.sampling {
-            Sampling::Full => 1,
-            Sampling::Bilateral => UNIFORM,
-            Sampling::Adaptive => COARSEST,
-        };
+        let coarsest = coarsest(self.params.sampling);
         let first = self.grid(coarsest, None);
         self.take(&first, &mut filled);
-        let lights: Vec<f32> = first.iter().map(|&i| filled.values[i].weight()).collect();
-        let mean = lights.iter().sum::<f32>() / lights.len().max(1) as f32;
-        let exposure = MIDDLE_GREY / mean.max(f32::MIN_POSITIVE);
+        let lights = first.iter().map(|&i| filled.values[i].weight());
+        let exposure = exposure(lights.sum(), first.len());
         let mut threshold = self.params.threshold;
         let mut step = coarsest / 2;
         while step > 0 {
@@ -173,6 +168,20 @@ impl<V: Received + Send + Sync> Sampler<'_, V> {
         let light: f32 = pairs.map(|(j, k)| (lights[j] - lights[k]).abs()).sum();
         geometry + self.params.lambda * light <= threshold
     }
+}
+
+/// Distance of the coarsest grid's pixels.
+pub(super) fn coarsest(sampling: Sampling) -> usize {
+    match sampling {
+        Sampling::Full => 1,
+        Sampling::Bilateral => UNIFORM,
+        Sampling::Adaptive => COARSEST,
+    }
+}
+
+/// What light is multiplied with for it to count, by that of the coarsest grid's pixels.
+fn exposure(sum: f32, pixels: usize) -> f32 {
+    MIDDLE_GREY / (sum / pixels.max(1) as f32).max(f32::MIN_POSITIVE)
 }
 
 /// How well two pixels lie on one surface, 0 to 1.

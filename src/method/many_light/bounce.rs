@@ -15,7 +15,7 @@ use crate::transport::World;
 use rayon::prelude::*;
 
 /// Marks random numbers of gathers at lights.
-const BOUNCE: u32 = 0x626f_756e;
+pub(crate) const BOUNCE: u32 = 0x626f_756e;
 
 /// Lights in the order that the tree has them, and the tree.
 pub struct Structure {

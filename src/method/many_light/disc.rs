@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 /// Entries each way.
-const SIZE: usize = 64;
+pub(crate) const SIZE: usize = 64;
 /// Points along the rim.
 const RIM: usize = 512;
 /// How many radii away a disc is a distant patch: there, cos · area / d² is 1.2 % too large at most.
@@ -16,9 +16,7 @@ pub const FAR: f32 = 8.0;
 /// Solid angle of a disc of radius 1 from `distance` > 0 away, in a direction at `cos` >= 0 from its axis; within 2 % up to [`FAR`], but for
 /// points next to the rim in its plane, where it jumps.
 pub fn solid_angle(distance: f32, cos: f32) -> f32 {
-    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-    let table =
-        TABLE.get_or_init(|| (0..SIZE * SIZE).map(|i| exact(distance_of(i % SIZE), cosine_of(i / SIZE)) as f32).collect());
+    let table = table();
     let last = (SIZE - 1) as f32;
     let x = (distance / (1.0 + distance) * (1.0 + FAR) / FAR * last).clamp(0.0, last);
     let y = cos.clamp(0.0, 1.0) * last;
@@ -26,6 +24,12 @@ pub fn solid_angle(distance: f32, cos: f32) -> f32 {
     let (fx, fy) = (x - i as f32, y - j as f32);
     let row = |j: usize| table[j * SIZE + i] + (table[j * SIZE + i + 1] - table[j * SIZE + i]) * fx;
     row(j) + (row(j + 1) - row(j)) * fy
+}
+
+/// The table, rows of [`SIZE`].
+pub(super) fn table() -> &'static [f32] {
+    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
+    TABLE.get_or_init(|| (0..SIZE * SIZE).map(|i| exact(distance_of(i % SIZE), cosine_of(i / SIZE)) as f32).collect())
 }
 
 /// Columns are even in d / (1 + d).

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 
 /// Directions over which a diffuse lobe's share towards viewers is averaged.
-const VIEWS: u32 = 4;
+pub(crate) const VIEWS: u32 = 4;
 
 /// Light that leaves a virtual point light.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -49,7 +49,7 @@ pub struct Site<'w> {
     /// The point.
     pub surface: Surface,
     /// 1 on the side of the shading normal, -1 behind.
-    side: f32,
+    pub(super) side: f32,
     /// Unit shading normal on its side.
     pub n: Vec3,
     bsdf: &'w Bsdf,

@@ -17,34 +17,34 @@ use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
 /// Directions within a spherical light's cone.
-const CONE: u32 = 8;
+pub(crate) const CONE: u32 = 8;
 /// Solid angle below which a spherical light is a point.
-const SMALL: f32 = 1e-3;
+pub(crate) const SMALL: f32 = 1e-3;
 
 /// A cluster and the light that it sends out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
     /// Mean position.
-    p: Vec3,
+    pub(super) p: Vec3,
     /// Area of all its lights.
-    area: f32,
+    pub(super) area: f32,
     /// Mean normal, as short as they differ.
-    n: Vec3,
+    pub(super) n: Vec3,
     /// Where a traversal goes on that takes it as a whole.
-    skip: u32,
+    pub(super) skip: u32,
     /// Squared distance below which a traversal goes on to its children; what solid angles ask for and the max cut forbids is left out.
-    reach: f32,
+    pub(super) reach: f32,
     /// Mean diffuse radiance.
-    diffuse: Rgb,
+    pub(super) diffuse: Rgb,
     /// Mean glossy radiance.
-    lobe: Lobe,
+    pub(super) lobe: Lobe,
     /// Its lights in the tree's order: the first, and how many.
     pub lights: [u32; 2],
 }
 
 /// The light of a frame, ready to be gathered.
 pub struct Gather {
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     sphere: f32,
     kernel: Kernel,
     shadow_rays: usize,

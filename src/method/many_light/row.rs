@@ -4,6 +4,7 @@ use super::adaptive::{Filled, Sampler};
 use super::arrival::Received;
 use super::bounce::{Structure, light, sites};
 use super::gather::Gather;
+use super::gpu::{ManyLightOnGpu, Tally};
 use super::params::ManyLightParams;
 use super::points::{Places, place};
 use super::shade::{Light, Shading};
@@ -12,14 +13,18 @@ use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
+use crate::gpu::Gpu;
 use crate::material::bsdf::{Lobes, Query};
 use crate::method::{Frame, Method, Options, Reads, Renderer, Setup, as_given};
+use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
 use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, denoise, guides};
-use crate::view::direct::direct;
+use crate::view::direct::{GLOSSY_BRANCH, direct};
 use crate::view::gbuffer::{GBuffer, GLOSSY};
+use crate::view::layers::LayerImages;
 use serde_json::Value as Json;
+use std::sync::Arc;
 
 /// The row.
 pub const METHOD: Method = Method {
@@ -35,12 +40,9 @@ pub const METHOD: Method = Method {
     parameters,
     for_scene: as_given,
     cpu,
-    gpu: None,
+    gpu: Some(gpu),
     diffuse: None,
 };
-
-/// Branch of a pixel's random stream: direct light of the glossy layer.
-const GLOSSY_BRANCH: u32 = 1;
 
 fn parameters(options: &Options) -> Result<Json> {
     let base = ManyLightParams::default();
@@ -136,27 +138,105 @@ impl Renderer for OnCpu<'_> {
             seeds: [setup.seed, view.frame],
         };
         let ([diffuse, glossy], filled) = self.layers(&shading, &g, view.frame, &mut clock);
-        let mut layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
-        if let Some(of) = &params.denoise {
-            let guides = guides(world, &view.camera, of, GUIDE_SAMPLES, setup.seed, view.frame);
-            layers = denoise(&layers, &guides, view.camera.size[0] as usize, of);
-            clock.lap("denoise");
-        }
+        let layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
+        let layers = finished(layers, world, view, (&params, setup.seed), &mut clock);
         self.structure = Some(structure);
         progress.advance(view.camera.size[1].into());
-        Ok(Frame { counts: counts(&filled), ..Frame::of(layers, clock.laps) })
+        Ok(Frame { counts: counts(&filled).listed(), ..Frame::of(layers, clock.laps) })
     }
 }
 
+/// Layers after the last pass, on the CPU whichever device has made them: the filter, where it is asked for.
+fn finished(
+    layers: LayerImages,
+    world: &World,
+    view: &View,
+    (params, seed): (&ManyLightParams, u32),
+    clock: &mut Clock,
+) -> LayerImages {
+    let Some(of) = &params.denoise else { return layers };
+    let guides = guides(world, &view.camera, of, GUIDE_SAMPLES, seed, view.frame);
+    let layers = denoise(&layers, &guides, view.camera.size[0] as usize, of);
+    clock.lap("denoise");
+    layers
+}
+
 /// Shading points, and the nodes that were visited a point.
-fn counts(filled: &Filled<Sample>) -> Vec<(&'static str, f64)> {
-    let visited = || filled.values.iter().zip(&filled.sampled).filter(|(_, sampled)| **sampled).map(|(s, _)| s.visited);
-    let points = visited().count();
-    let mean = visited().map(f64::from).sum::<f64>() / points.max(1) as f64;
-    vec![
-        ("shading points", points as f64),
-        ("least nodes", visited().min().unwrap_or(0).into()),
-        ("most nodes", visited().max().unwrap_or(0).into()),
-        ("mean nodes", mean),
-    ]
+fn counts(filled: &Filled<Sample>) -> Tally {
+    let visited =
+        || filled.values.iter().zip(&filled.sampled).filter(|(_, sampled)| **sampled).map(|(s, _)| u64::from(s.visited));
+    let ends = [visited().min(), visited().max()].map(Option::unwrap_or_default);
+    Tally { points: visited().count() as u32, nodes: [ends[0], ends[1], visited().sum()] }
+}
+
+impl Tally {
+    fn listed(&self) -> Vec<(&'static str, f64)> {
+        let [least, most, sum] = self.nodes.map(|n| n as f64);
+        vec![
+            ("shading points", self.points.into()),
+            ("least nodes", least),
+            ("most nodes", most),
+            ("mean nodes", sum / f64::from(self.points.max(1))),
+        ]
+    }
+}
+
+struct OnGpu<'a> {
+    setup: Setup<'a>,
+    params: ManyLightParams,
+    places: Places,
+    lights: ManyLightOnGpu,
+}
+
+fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let params: ManyLightParams = setup.parameters()?;
+    let first = setup.animation.map(|animation| setup.world.at(animation, 0));
+    let world = first.as_ref().unwrap_or(setup.world);
+    let places = place(world, params.vpls, params.repulsion, setup.seed);
+    let sites = sites(world, &places, &params);
+    let structure = Structure::new(&sites, &params, setup.seed);
+    let mut lights = ManyLightOnGpu::new(gpu, setup.world, (&sites, &structure), &params)?;
+    // What the GPU lacks shows in any frame.
+    if let Some(world) = &first {
+        lights.relight(world, None)?;
+    }
+    Ok(Box::new(OnGpu { setup: *setup, params, places, lights }))
+}
+
+impl OnGpu<'_> {
+    /// Takes a frame's world, and its lights where shapes that carry them move.
+    fn relight(&mut self, world: &World) -> Result<()> {
+        if !world.has_added() {
+            return self.lights.relight(world, None);
+        }
+        let sites = sites(world, &self.places, &self.params);
+        let structure = Structure::new(&sites, &self.params, self.setup.seed);
+        self.lights.relight(world, Some((&sites, &structure)))
+    }
+}
+
+impl Renderer for OnGpu<'_> {
+    fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
+        let mut clock = Clock::start();
+        let of_frame = self.setup.world_at(view);
+        if let Some(world) = &of_frame {
+            self.relight(world)?;
+            clock.lap("world");
+        }
+        let world = of_frame.as_ref().unwrap_or(self.setup.world);
+        let (frame, tally) = self.lights.frame(&view.camera, [self.setup.seed, view.frame])?;
+        clock.laps.extend(frame.passes);
+        clock.restart();
+        let layers = finished(frame.layers, world, view, (&self.params, self.setup.seed), &mut clock);
+        progress.advance(view.camera.size[1].into());
+        Ok(Frame { counts: tally.listed(), ..Frame::of(layers, clock.laps) })
+    }
+
+    fn gpu(&self) -> Option<(&str, bool)> {
+        Some((self.lights.device(), self.lights.has_clock()))
+    }
+
+    fn probe_bytes(&self) -> [u64; 2] {
+        [0, self.lights.bytes()]
+    }
 }

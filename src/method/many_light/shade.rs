@@ -19,7 +19,7 @@ use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Marks random numbers of gathers at pixels.
-const PIXEL: u32 = 0x7069_7865;
+pub(crate) const PIXEL: u32 = 0x7069_7865;
 
 /// Light at a point, without its albedos.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

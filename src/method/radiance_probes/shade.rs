@@ -12,7 +12,7 @@ use crate::material::bsdf::warp::cosine_hemisphere;
 use crate::material::bsdf::{Lobes, Query};
 use crate::transport::path::{PathParams, scattered};
 use crate::transport::{Sampler, World};
-use crate::view::direct::direct;
+use crate::view::direct::{GLOSSY_BRANCH, direct};
 use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -20,8 +20,8 @@ use std::f32::consts::{FRAC_1_PI, PI};
 /// Directions by which light of first order is taken in.
 pub(crate) const DIRECTIONS: u32 = 16;
 
-/// Branches of a pixel's random stream: direct light of the glossy layer, and paths along its lobes.
-pub(crate) const BRANCHES: [u32; 2] = [1, 2];
+/// Branch of a pixel's random stream: paths along its lobes.
+const ALONG_LOBES: u32 = 2;
 
 /// Light that comes by way of the probes, where pixels look it up.
 pub enum Indirect {
@@ -83,11 +83,11 @@ impl Shading<'_> {
     pub fn glossy(&self, view: &GBuffer) -> Vec<Rgb> {
         view.shade([self.seed, self.frame], |p, stream| match (self.total, self.indirect) {
             _ if p.alpha.is_none() => Rgb::ZERO,
-            (Some(total), _) => self.along_lobes(p, total, hash_words(&[stream, BRANCHES[1]])),
+            (Some(total), _) => self.along_lobes(p, total, hash_words(&[stream, ALONG_LOBES])),
             (None, Indirect::Irradiance(_)) => Rgb::ZERO,
             (None, Indirect::Radiance(maps)) => {
                 let count = self.params.direct_samples;
-                let straight = direct(self.world, p, GLOSSY, count, hash_words(&[stream, BRANCHES[0]]));
+                let straight = direct(self.world, p, GLOSSY, count, hash_words(&[stream, GLOSSY_BRANCH]));
                 straight + self.reflected(p, &looked_up(maps, p))
             }
         })

@@ -1,0 +1,165 @@
+//! Frames by many lights on a device: the twin of what [`super::row`] does on the CPU.
+//!
+//! Lights are placed and the tree is built on the CPU. On the device are the light that they send ([`lights`]), and the pixels that are chosen
+//! and lit ([`pixels`]).
+
+pub(crate) mod lights;
+pub(crate) mod pixels;
+
+use super::ManyLightParams;
+use super::bounce::Structure;
+use super::emit::Site;
+use super::params::Kernel as LobeShape;
+use crate::Result;
+use crate::gpu::Gpu;
+use crate::gpu::camera::GpuCamera;
+use crate::gpu::commands::Commands;
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::{StructLayout, layout};
+use crate::gpu::view::direct::DirectLight;
+use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
+use crate::scene::Camera;
+use crate::transport::World;
+use bytemuck::{Pod, Zeroable};
+use lights::GpuLights;
+use pixels::GpuPixels;
+use std::sync::Arc;
+
+/// `Params` of params.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    camera: GpuCamera,
+    seed: u32,
+    frame: u32,
+    first: u32,
+    count: u32,
+    lights: u32,
+    nodes: u32,
+    samples: u32,
+    bounce: u32,
+    sphere: f32,
+    clamp: f32,
+    min_exponent: f32,
+    max_exponent: f32,
+    lobes: u32,
+    step: u32,
+    level: u32,
+    bilateral: u32,
+    lambda: f32,
+    threshold: f32,
+    diagonal: f32,
+    padding: u32,
+}
+pub(crate) const PARAMS: StructLayout = layout!(Params as "Params" {
+    camera, seed, frame, first, count, lights, nodes, samples, bounce, sphere, clamp, min_exponent, max_exponent, lobes, step, level,
+    bilateral, lambda, threshold, diagonal
+});
+
+impl Params {
+    /// What all passes of a frame are told.
+    fn new(camera: &Camera, [seed, frame]: [u32; 2], params: &ManyLightParams) -> Self {
+        Self {
+            camera: camera.into(),
+            seed,
+            frame,
+            samples: params.light_samples,
+            sphere: params.sphere,
+            clamp: params.clamp,
+            min_exponent: params.min_exponent,
+            max_exponent: params.max_exponent,
+            lobes: params.lobes.into(),
+            lambda: params.lambda,
+            ..Self::zeroed()
+        }
+    }
+}
+
+/// Values of gather.wgsl's constants.
+fn constants(params: &ManyLightParams) -> [(&'static str, f64); 2] {
+    let is_gaussian = params.kernel == LobeShape::Gaussian;
+    [("GAUSSIAN", f64::from(u8::from(is_gaussian))), ("SHADOW_RAYS", params.shadow_rays.into())]
+}
+
+/// Renders frames on a device.
+pub struct ManyLightOnGpu {
+    baseline: Baseline,
+    lights: GpuLights,
+    pixels: GpuPixels,
+    direct: DirectLight,
+    params: ManyLightParams,
+    /// Whether the lights' light is that of the scene.
+    is_lit: bool,
+}
+
+/// What a frame's sampling came to.
+pub struct Tally {
+    /// Pixels at which light was gathered.
+    pub points: u32,
+    /// The least, the most and the sum of the nodes that were visited for them.
+    pub nodes: [u64; 3],
+}
+
+impl ManyLightOnGpu {
+    /// Uploads lights and compiles the passes.
+    pub fn new(gpu: Arc<Gpu>, world: &World, of: (&[Site], &Structure), params: &ManyLightParams) -> Result<Self> {
+        let baseline = Baseline::new(gpu, world, None, params.supersample)?;
+        let scene = &*baseline.scene;
+        Ok(Self {
+            lights: GpuLights::new(scene, of, params)?,
+            pixels: GpuPixels::new(scene, world, params)?,
+            direct: DirectLight::new(scene)?,
+            params: *params,
+            is_lit: false,
+            baseline,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        self.baseline.scene.device()
+    }
+
+    /// Whether passes are timed by the device's own clock.
+    pub fn has_clock(&self) -> bool {
+        self.baseline.scene.gpu.adapter.timestamps
+    }
+
+    /// Bytes of the lights on the device.
+    pub fn bytes(&self) -> u64 {
+        self.lights.bytes()
+    }
+
+    /// Takes a frame's world, and its lights where they lie elsewhere.
+    pub fn relight(&mut self, world: &World, moved: Option<(&[Site], &Structure)>) -> Result<()> {
+        let scene: GpuScene = self.baseline.scene.at(world)?;
+        if let Some(of) = moved {
+            self.lights.place(&scene.gpu, of, &self.params)?;
+        }
+        self.lights.rebind(&scene);
+        self.pixels.rebind(&scene);
+        self.direct.rebind(&scene);
+        self.baseline.rebind(scene);
+        self.is_lit = false;
+        Ok(())
+    }
+
+    /// A frame.
+    pub fn frame(&mut self, camera: &Camera, seeds: [u32; 2]) -> Result<(BaselineFrame, Tally)> {
+        let Self { baseline, lights, pixels, direct, params, is_lit } = self;
+        let scene = baseline.scene.clone();
+        let gpu = &*scene.gpu;
+        let mut commands = Commands::new(gpu);
+        if !*is_lit {
+            gpu.checked(|| lights.light(gpu, &mut commands, &Params::new(camera, seeds, params), params.bounces)).flatten()?;
+            *is_lit = true;
+        }
+        let frame = baseline.frame(camera, true, commands, |commands, camera: &Camera, target: &Target| {
+            let base = Params { nodes: lights.nodes(), ..Params::new(camera, seeds, params) };
+            pixels.light(gpu, commands, (&base, params), (lights, target))?;
+            pixels.layers(gpu, commands, camera, target, (params.direct_samples, seeds))?;
+            direct.run(&scene, (commands, "direct"), (camera, &target.view), params.direct_samples, seeds)
+        })?;
+        Ok((frame, pixels.tally(gpu)?))
+    }
+}

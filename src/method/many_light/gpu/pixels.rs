@@ -1,0 +1,201 @@
+//! Pixels that are chosen and lit on a device: the twin of [`super::super::adaptive`] and of [`super::super::shade`].
+
+use super::lights::{GATHER_PATHS, GpuLights, NODE, SITE};
+use super::{PARAMS, Params, Tally, constants};
+use crate::Result;
+use crate::gpu::Gpu;
+use crate::gpu::camera::CAMERA;
+use crate::gpu::commands::Commands;
+use crate::gpu::kernel::{Kernel, area};
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
+use crate::gpu::view::frame::Target;
+use crate::gpu::view::pixel_run::{PIXEL_RUN, PixelRun, runs};
+use crate::gpu::view::{PIXEL, REFLECTED, SHADING};
+use crate::method::many_light::adaptive::coarsest;
+use crate::method::many_light::{ManyLightParams, Sampling};
+use crate::scene::Camera;
+use crate::transport::World;
+use bytemuck::{Pod, Zeroable};
+
+/// Most grids.
+const GRIDS: usize = 5;
+/// Lanes of tally.wgsl.
+const LANES: u64 = 256;
+
+/// `LitPixel` of lit_pixel.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct LitPixel {
+    irradiance: [f32; 3],
+    visited: u32,
+    glossy: [f32; 3],
+    listed: u32,
+}
+
+/// `Grids` of grid.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Grids {
+    exposure: f32,
+    counts: [u32; GRIDS],
+}
+
+const LIT_PIXEL: StructLayout = layout!(LitPixel as "LitPixel" { irradiance, visited, glossy, listed });
+const GRIDS_LAYOUT: StructLayout = layout!(Grids as "Grids" { exposure, counts });
+
+/// Interpolates pixels, and lists those that are to be lit.
+pub(crate) const CHOOSE_PIXELS: KernelSpec = KernelSpec {
+    file: "many_light/choose_pixels.wgsl",
+    twin: "src/method/many_light/adaptive.rs: fill",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[("params", Uniform), ("view", Read), ("lit", ReadWrite), ("grids", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &LIT_PIXEL, &GRIDS_LAYOUT],
+};
+/// What light counts for.
+pub(crate) const EXPOSE: KernelSpec = KernelSpec {
+    file: "many_light/expose.wgsl",
+    twin: "src/method/many_light/adaptive.rs: exposure",
+    workgroup: [256, 1],
+    scene: false,
+    bindings: &[("params", Uniform), ("view", Read), ("lit", ReadWrite), ("grids", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &LIT_PIXEL, &GRIDS_LAYOUT],
+};
+/// Lights the pixels of the list.
+pub(crate) const LIGHT_PIXELS: KernelSpec = KernelSpec {
+    file: "many_light/light_pixels.wgsl",
+    twin: "src/method/many_light/shade.rs: light",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[("params", Uniform), ("disc", Uniform), ("sites", Read), ("nodes", Read), ("view", Read), ("lit", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &SITE, &NODE, &PIXEL, &REFLECTED, &LIT_PIXEL],
+};
+/// The layers.
+pub(crate) const VIEW_LAYERS: KernelSpec = KernelSpec {
+    file: "many_light/view_layers.wgsl",
+    twin: "src/method/many_light/shade.rs: layers",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[("params", Uniform), ("view", Read), ("shading", ReadWrite), ("glossy", ReadWrite), ("lit", Read)],
+    structs: &[&PIXEL_RUN, &CAMERA, &PIXEL, &REFLECTED, &SHADING, &LIT_PIXEL],
+};
+/// Points and nodes.
+pub(crate) const TALLY: KernelSpec = KernelSpec {
+    file: "many_light/tally.wgsl",
+    twin: "src/method/many_light/row.rs: counts",
+    workgroup: [256, 1],
+    scene: false,
+    bindings: &[("lit", Read), ("tallies", ReadWrite)],
+    structs: &[&LIT_PIXEL],
+};
+
+/// What lights a view.
+pub(super) struct GpuPixels {
+    choose: Kernel,
+    expose: Kernel,
+    light: Kernel,
+    layers: Kernel,
+    tally: Kernel,
+    grids: wgpu::Buffer,
+    tallies: wgpu::Buffer,
+    /// Of the last view.
+    lit: Option<wgpu::Buffer>,
+    diagonal: f32,
+}
+
+impl GpuPixels {
+    pub(super) fn new(scene: &GpuScene, world: &World, params: &ManyLightParams) -> Result<Self> {
+        let gpu = &scene.gpu;
+        let (lower, upper) = world.scene.geometry.bounds();
+        Ok(Self {
+            choose: Kernel::in_scene(scene, &CHOOSE_PIXELS, &[])?,
+            expose: Kernel::new(gpu, &EXPOSE)?,
+            light: Kernel::in_scene(scene, &LIGHT_PIXELS, &constants(params))?,
+            layers: Kernel::in_scene(scene, &VIEW_LAYERS, &[])?,
+            tally: Kernel::new(gpu, &TALLY)?,
+            grids: gpu.output("grids of pixels", size_of::<Grids>() as u64)?,
+            tallies: gpu.output("counts", LANES * size_of::<[u32; 4]>() as u64)?,
+            lit: None,
+            diagonal: lower.distance(upper),
+        })
+    }
+
+    pub(super) fn rebind(&mut self, scene: &GpuScene) {
+        self.choose.rebind(scene);
+        self.light.rebind(scene);
+        self.layers.rebind(scene);
+    }
+
+    /// Indirect light of all pixels.
+    pub(super) fn light(
+        &mut self,
+        gpu: &Gpu,
+        commands: &mut Commands,
+        (base, params): (&Params, &ManyLightParams),
+        (lights, target): (&GpuLights, &Target),
+    ) -> Result<()> {
+        let [width, height] = target.view.size;
+        let bytes = area(target.view.size) * size_of::<LitPixel>() as u64;
+        let lit = match self.lit.take().filter(|lit| lit.size() == bytes) {
+            Some(lit) => lit,
+            None => gpu.output("light of pixels", bytes)?,
+        };
+        gpu.clear(&self.grids);
+        let base = Params { diagonal: self.diagonal, bilateral: u32::from(params.sampling == Sampling::Bilateral), ..*base };
+        let (mut step, mut level, mut threshold) = (coarsest(params.sampling) as u32, 0, params.threshold);
+        while step > 0 {
+            let pixels = width.div_ceil(step) * height.div_ceil(step);
+            let base = Params { step, level, threshold, ..base };
+            for (first, count) in runs(pixels, 1) {
+                let params = gpu.uniform("parameters of a grid", &Params { first, count, ..base })?;
+                commands.run("gather", &self.choose, &[&params, &target.view.pixels, &lit, &self.grids], [count, 1]);
+            }
+            for (first, count) in runs(pixels, GATHER_PATHS) {
+                let params = gpu.uniform("parameters of pixels", &Params { first, count, ..base })?;
+                let [disc, sites, nodes] = lights.gathered();
+                commands.run("gather", &self.light, &[&params, disc, sites, nodes, &target.view.pixels, &lit], [count, 1]);
+            }
+            if level == 0 {
+                let params = gpu.uniform("parameters of exposure", &Params { count: pixels, ..base })?;
+                commands.run("gather", &self.expose, &[&params, &target.view.pixels, &lit, &self.grids], [1, 1]);
+            } else {
+                threshold *= 2.0;
+            }
+            step /= 2;
+            level += 1;
+        }
+        commands.run("gather", &self.tally, &[&lit, &self.tallies], [1, 1]);
+        self.lit = Some(lit);
+        Ok(())
+    }
+
+    /// Both layers of the pixels that were lit last: all of the glossy one, and of the diffuse one indirect light.
+    pub(super) fn layers(
+        &self,
+        gpu: &Gpu,
+        commands: &mut Commands,
+        camera: &Camera,
+        target: &Target,
+        (samples, seeds): (u32, [u32; 2]),
+    ) -> Result<()> {
+        let Some(lit) = &self.lit else { return Ok(()) };
+        for run in runs(area(target.view.size) as u32, samples) {
+            let params = gpu.uniform("parameters of layers", &PixelRun::new(camera, seeds, run, samples))?;
+            let buffers = [&params, &target.view.pixels, &target.view.shading, &target.glossy, lit];
+            commands.run("direct", &self.layers, &buffers, [run.1, 1]);
+        }
+        Ok(())
+    }
+
+    /// What came of the sampling.
+    pub(super) fn tally(&self, gpu: &Gpu) -> Result<Tally> {
+        let parts: Vec<[u32; 4]> = gpu.read(&self.tallies)?;
+        let of = |k: usize| parts.iter().map(move |part| part[k]);
+        let points = of(0).sum();
+        let least = if points > 0 { of(1).min() } else { None };
+        let sum = of(3).map(u64::from).sum();
+        Ok(Tally { points, nodes: [least.unwrap_or(0).into(), of(2).max().unwrap_or(0).into(), sum] })
+    }
+}
