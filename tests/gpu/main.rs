@@ -13,6 +13,7 @@ mod light_field;
 mod paths;
 mod radiance_probes;
 mod rays;
+mod shapes;
 mod ulr;
 
 use frames::Baked;
@@ -97,6 +98,8 @@ const TWICE: &[Test] = tests![
     rays::a_scene_without_surfaces_has_no_hits,
     rays::closest_hits_are_the_cpus,
     rays::rays_go_on_through_alpha_masks_as_on_the_cpu,
+    shapes::rays_meet_what_frames_add,
+    shapes::traced_frames_are_the_cpus,
     ulr::lumigraphs_are_the_cpus,
 ];
 

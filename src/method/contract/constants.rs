@@ -10,7 +10,7 @@ use crate::material::surface;
 use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gpu_gather};
 use crate::method::glossy_probes::{coverage, filter, footprint, perturb, previous, search};
 use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
-use crate::method::radiance_probes::{gpu as gpu_radiance_probes, seen, shade as shade_of_radiance_probes};
+use crate::method::radiance_probes::{gpu as gpu_radiance_probes, light, seen, shade as shade_of_radiance_probes, volume};
 use crate::method::{image_space_gather, ulr};
 use crate::probe::{neighbors, parameter_map as qhmap};
 use crate::transport::{bvh, light_tree, path, sampler};
@@ -131,6 +131,7 @@ fn twins(file: &str) -> Twins {
         },
         "path_trace/add_guides.wgsl" => twins! { ENVIRONMENT_DEPTH = denoise::FAR; },
         "path_trace/denoise.wgsl" => twins! { MIN_ALBEDO = denoise::MIN_ALBEDO; },
+        "radiance_probes/blockers.wgsl" => twins! { BLOCKER = light::BLOCKER; },
         "radiance_probes/fill_ring.wgsl" => twins! { CORNER = fill::CORNER; },
         "radiance_probes/first_order.wgsl" => twins! {
             DIRECTIONS = shade_of_radiance_probes::DIRECTIONS;
@@ -142,6 +143,8 @@ fn twins(file: &str) -> Twins {
             RECEIVER_WORDS = gpu_radiance_probes::RECEIVER_WORDS;
             BACK_BIT = receivers::BACK_BIT;
         },
+        "radiance_probes/taps.wgsl" => twins! { VOLUME_NUMBERS = volume::NUMBERS; },
+        "radiance_probes/volume.wgsl" => twins! { VOLUME_DIRECTIONS = volume::DIRECTIONS; },
         "shared/albedo.wgsl" => twins! {
             ALBEDO_COSINES = albedo::COSINES;
             ALBEDO_ALPHAS = albedo::ALPHAS;
