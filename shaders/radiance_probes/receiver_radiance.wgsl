@@ -27,7 +27,8 @@ fn irradiance(i: u32) -> vec4<f32> {
 @compute @workgroup_size(64)
 fn receiver_radiance(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.x;
-    if i < arrayLength(&radiance) {
+    // Behind them comes what stands in the way of relight rays.
+    if i < arrayLength(&reflectance) {
         radiance[i] = (direct[i] + max(irradiance(i), vec4(0.0))) * reflectance[i];
     }
 }

@@ -43,7 +43,7 @@ fn curvature_tensor(c: VertexCurvature, frame: Frame) -> vec3<f32> {
 
 // A plane's entry at a point of a triangle, relative to the unit normal `n` there. Twin: surface::CurvatureMap::at.
 fn curvature_at(s: Surface, n: vec3<f32>) -> vec4<f32> {
-    if curved_vertices[3u * s.triangle] == NONE {
+    if is_added(s.triangle) || curved_vertices[3u * s.triangle] == NONE {
         return vec4(0.0, 0.0, 1.0, 0.0);
     }
     let frame = frame_from_normal(n);

@@ -10,6 +10,9 @@ fn lightmap_lookup(triangle: u32, barycentric: vec2<f32>, back: bool) -> vec3<f3
 
 // The same in one of several light maps that lie behind each other.
 fn lightmap_lookup_in(map: u32, triangle: u32, barycentric: vec2<f32>, back: bool) -> vec3<f32> {
+    if is_added(triangle) {
+        return vec3(0.0);
+    }
     let a = light_corner(3u * triangle);
     if (back && scene.light_back == NONE) || !is_finite(a.x) {
         return vec3(0.0);

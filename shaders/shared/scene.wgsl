@@ -147,6 +147,9 @@ struct SceneParams {
     suns: u32,
     // The first entry in `tree` of the primitives.
     corners: u32,
+    // How many triangles are the scene's own; those that a frame adds come after them. The root of their tree; NONE where there are none.
+    triangles: u32,
+    added: u32,
     // Where in `words` lie the suns' emitters, the Sobol directions and the two tables of albedos.
     sun_list: u32,
     sobol: u32,
@@ -164,12 +167,17 @@ struct SceneParams {
 @group(1) @binding(0) var<uniform> scene_params: SceneParams;
 var<private> scene: SceneParams;
 // Five a node, then three a primitive, in the order of the tree's leaves. Their w hold the triangle, its material if that lets rays through,
-// and its object.
+// and its object. What a frame adds comes after, nodes and primitives numbered as the scene's own.
 @group(1) @binding(1) var<storage, read> tree: array<vec4<u32>>;
 // Seven a triangle: see surface.wgsl.
 @group(1) @binding(2) var<storage, read> facets: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read> words: array<u32>;
 @group(1) @binding(4) var<storage, read> records: array<vec4<u32>>;
+
+// Whether a triangle is of a shape that a frame adds. Twin: transport::World::is_added.
+fn is_added(triangle: u32) -> bool {
+    return triangle >= scene.triangles;
+}
 
 fn word_f32(i: u32) -> f32 {
     return bitcast<f32>(words[i]);

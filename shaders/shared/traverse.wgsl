@@ -119,6 +119,11 @@ fn children_hit(node: u32, ray: Ray, inverse: vec3<f32>, octant: u32, t_max: f32
 
 // The closest hit; with `any`, the first that is found. Empty where t_max is below t_min.
 fn traverse(ray: Ray, any: bool) -> Hit {
+    return traverse_both(ray, any, scene.added);
+}
+
+// The same in the scene's own tree and in the one whose root is `added`, if that is not NONE.
+fn traverse_both(ray: Ray, any: bool, added: u32) -> Hit {
     var best = Hit(ray.t_max, NO_TRIANGLE, 0.0, 0.0);
     let s = shear_of(ray);
     // Small enough to be no direction at all, large enough that its inverse times a scene stays a number.
@@ -128,6 +133,11 @@ fn traverse(ray: Ray, any: bool) -> Hit {
     let octant = 7u - (select(0u, 4u, d.x < 0.0) | select(0u, 2u, d.y < 0.0) | select(0u, 1u, d.z < 0.0));
     var stack: array<vec2<u32>, STACK>;
     var height = 0u;
+    if added != NONE {
+        // Lowest in the stack: its turn is when the scene's own tree is done.
+        stack[0] = vec2(added, 0x80000000u);
+        height = 1u;
+    }
     var inner = vec2(0u, 0x80000000u);
     loop {
         var primitives = vec2(0u, 0u);

@@ -245,7 +245,7 @@ impl Gpu {
     /// A buffer with `content`.
     pub(crate) fn upload(&self, label: &str, content: &[u8]) -> Result<wgpu::Buffer> {
         self.fits(label, content.len() as u64)?;
-        self.init(label, content, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
+        self.init(label, content, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST)
     }
 
     fn init(&self, label: &str, content: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {

@@ -122,6 +122,12 @@ impl Samples {
         Ok(Self { scene, kernel, params })
     }
 
+    /// Takes a frame of the scene.
+    pub fn rebind(&mut self, scene: Arc<GpuScene>) {
+        self.kernel.rebind(&scene);
+        self.scene = scene;
+    }
+
     /// The same for half of the first vertex, without compiling it again.
     pub fn half(&self, lobes: Lobes, place: Place) -> Self {
         let place = (place.branch.unwrap_or(u32::MAX), place.first_set);

@@ -249,14 +249,6 @@ impl<'a> Setup<'a> {
         self.animation.map(|animation| self.world.at(animation, view.frame))
     }
 
-    /// An error where something changes from frame to frame, from a device that keeps the scene as it is.
-    pub fn refuse_animation(&self, device: &str) -> Result<()> {
-        match self.animation {
-            Some(_) => Err(Error::Request(format!("--lights: {device} has the scene's own light alone; use --device cpu"))),
-            None => Ok(()),
-        }
-    }
-
     /// The light map of a method that does nothing without it.
     pub fn required_lightmap(&self) -> Result<&'a LightMap> {
         self.lightmap.ok_or_else(|| Error::Request("a light map is needed: --lightmap FILE, written by bake-lightmap".into()))

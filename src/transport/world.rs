@@ -32,8 +32,8 @@ pub struct World {
 ///
 /// *Ours*: a tree of their own, asked after the scene's, as the latter takes seconds to build.
 pub(crate) struct Added {
-    bvh: Bvh,
-    facets: Vec<Facet>,
+    pub(crate) bvh: Bvh,
+    pub(crate) facets: Vec<Facet>,
 }
 
 impl World {

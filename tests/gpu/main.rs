@@ -14,6 +14,7 @@ mod many_light;
 mod paths;
 mod radiance_probes;
 mod rays;
+mod shapes;
 mod ulr;
 
 use frames::Baked;
@@ -99,6 +100,8 @@ const TWICE: &[Test] = tests![
     rays::a_scene_without_surfaces_has_no_hits,
     rays::closest_hits_are_the_cpus,
     rays::rays_go_on_through_alpha_masks_as_on_the_cpu,
+    shapes::rays_meet_what_frames_add,
+    shapes::traced_frames_are_the_cpus,
     ulr::lumigraphs_are_the_cpus,
 ];
 

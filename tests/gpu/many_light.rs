@@ -18,6 +18,7 @@ pub fn frames_are_the_cpus(device: &Device) {
         ),
         ("lights-shadowed", "--set sampling=bilateral --set shadow_rays=2 --set bounces=1", 0.02),
         ("lights-moved", "--set sampling=full --lights dark.json", 1e-3),
+        ("lights-objects", "--set sampling=full --lights objects.json", 1e-3),
     ] {
         // Kernels are compiled for each; this one has them all.
         if device.checks == Checks::Off && name != "lights-shadowed" {

@@ -10,12 +10,12 @@ use reprobe::scene::Scene;
 use reprobe::transport::{Sampler, World};
 use std::sync::Arc;
 
-fn tracer(gpu: Arc<Gpu>, world: &World) -> RayTracer {
+pub fn tracer(gpu: Arc<Gpu>, world: &World) -> RayTracer {
     RayTracer::new(Arc::new(GpuScene::new(gpu, world).unwrap())).unwrap()
 }
 
 /// Rays from within the room's bounds in all directions, some of them along the axes and short ones.
-fn rays(world: &World, count: u32) -> Vec<Ray> {
+pub fn rays(world: &World, count: u32) -> Vec<Ray> {
     let points = &world.scene.geometry.positions;
     let (lo, hi) = points.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
     (0..count)
@@ -34,7 +34,7 @@ fn rays(world: &World, count: u32) -> Vec<Ray> {
 }
 
 /// Hits are the same but where two triangles are equally near, or an edge is grazed; distances but for rounding.
-fn check(scene: &Scene, rays: &[Ray], gpu: &[Option<Hit>], cpu: &[Option<Hit>]) {
+pub fn check(scene: &Scene, rays: &[Ray], gpu: &[Option<Hit>], cpu: &[Option<Hit>]) {
     let scale = scene.geometry.positions.iter().fold(1f32, |m, p| m.max(p.abs().max_element()));
     let mut other = 0;
     for ((ray, a), b) in rays.iter().zip(gpu).zip(cpu) {

@@ -2,6 +2,7 @@
 
 pub(crate) mod lights;
 pub(crate) mod materials;
+mod shapes;
 pub(crate) mod textures;
 
 use super::Gpu;
@@ -11,12 +12,11 @@ use crate::lightmap::LightMap;
 use crate::material::bsdf::{Distribution, albedo};
 use crate::scene::Emitter;
 use crate::transport::World;
-use crate::transport::facet::Facet;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable, cast_slice};
 use lights::{emitters, environments, near};
 use materials::{Models, tilts};
-use obvhs::cwbvh::CwBvh;
+use shapes::Shapes;
 use std::sync::Arc;
 use textures::Textures;
 
@@ -44,6 +44,8 @@ struct SceneParams {
     has_near: u32,
     suns: u32,
     corners: u32,
+    triangles: u32,
+    added: u32,
     sun_list: u32,
     sobol: u32,
     albedo: u32,
@@ -63,8 +65,8 @@ pub(crate) const BINDINGS: [(&str, Access); 5] = [
     ("records", Access::Read),
 ];
 const PARAMS: StructLayout = layout!(SceneParams as "SceneParams" {
-    materials, models, textures, emitters, near, light_nodes, environments, environment_count, has_near, suns, corners, sun_list, sobol,
-    albedo, light_width, light_height, light_front, light_back, light_corners
+    materials, models, textures, emitters, near, light_nodes, environments, environment_count, has_near, suns, corners, triangles,
+    added, sun_list, sobol, albedo, light_width, light_height, light_front, light_back, light_corners
 });
 /// The structs of scene.wgsl.
 #[cfg_attr(not(test), allow(dead_code, reason = "read by the contract's test"))]
@@ -113,8 +115,7 @@ impl Records {
 #[derive(Clone)]
 pub struct GpuScene {
     pub(crate) gpu: Arc<Gpu>,
-    tree: wgpu::Buffer,
-    facets: wgpu::Buffer,
+    shapes: Shapes,
     words: wgpu::Buffer,
     records: wgpu::Buffer,
     /// Words before those of the light map.
@@ -129,20 +130,17 @@ impl GpuScene {
     /// Uploads what `world` is made of.
     pub fn new(gpu: Arc<Gpu>, world: &World) -> Result<Self> {
         check(world)?;
-        let (tree, corners) = tree(world)?;
-        let facets: Vec<[u32; 28]> = world.facets.iter().map(words_of).collect();
+        let shapes = Shapes::new(&gpu, world)?;
         let (mut records, mut words) = (Records::default(), Words::default());
-        let params = SceneParams { corners, ..params(world, &mut records, &mut words)? };
-        let tree = gpu.upload("the scene's tree", cast_slice(&tree))?;
-        let facets = gpu.upload("the scene's surfaces", cast_slice(&facets))?;
+        let params = params(world, &shapes, &mut records, &mut words)?;
         words.extend([0; ROOM]);
         let unlit_words = words.0.len() as u64;
         let words = gpu.upload("the scene's textures", cast_slice(&words.0))?;
         let records = gpu.upload("the scene's materials and emitters", cast_slice(&records.0))?;
         let layout = gpu.checked(|| layout(&gpu.device, "scene", BINDINGS.iter().map(|(_, access)| *access)))?;
-        let group = group(&gpu, &layout, params, [&tree, &facets, &words, &records])?;
+        let group = group(&gpu, &layout, params, &shapes, [&words, &records])?;
         let has_masks = world.scene.materials.iter().any(|m| m.opacity.is_some());
-        Ok(Self { gpu, tree, facets, words, records, unlit_words, params, has_masks, layout, group })
+        Ok(Self { gpu, shapes, words, records, unlit_words, params, has_masks, layout, group })
     }
 
     /// A scene on a device, with a light map where there is one.
@@ -174,34 +172,32 @@ impl GpuScene {
             gpu.queue.write_buffer(&words, before, light);
             gpu.queue.submit([encoder.finish()]);
         })?;
-        let group = group(gpu, &self.layout, params, [&self.tree, &self.facets, &words, &self.records])?;
+        let group = group(gpu, &self.layout, params, &self.shapes, [&words, &self.records])?;
         Ok(Self { words, params, group, ..self.clone() })
     }
 
-    /// Of a scene with a light map: the same triangles with the materials and emitters of a frame's world, and the light map as it is. The
-    /// scene itself is no longer of use: both share what lies before the light map, which is written anew.
-    ///
-    /// # Errors
-    /// The frame adds shapes, or makes some emit that do not in the scene.
+    /// The scene of a frame, whose world this is, with the light map that there is. The scene itself, or the frame before, is no longer of use:
+    /// both share what lies before the light map, and the triangles, which are written anew where they differ.
     pub(crate) fn at(&self, world: &World) -> Result<Self> {
         check(world)?;
         let gpu = &self.gpu;
+        let shapes = self.shapes.at(gpu, world)?;
         let (mut records, mut words) = (Records::default(), Words::default());
-        let fresh = params(world, &mut records, &mut words)?;
+        let fresh = params(world, &shapes, &mut records, &mut words)?;
         if words.0.len() as u64 > self.unlit_words {
             return Err(Error::Request("--lights: a frame's textures are more than the scene's; use --device cpu".into()));
         }
-        let SceneParams { corners, light_width, light_height, light_front, light_back, light_corners, .. } = self.params;
-        let params = SceneParams { corners, light_width, light_height, light_front, light_back, light_corners, ..fresh };
+        let SceneParams { light_width, light_height, light_front, light_back, light_corners, .. } = self.params;
+        let params = SceneParams { light_width, light_height, light_front, light_back, light_corners, ..fresh };
         gpu.checked(|| gpu.queue.write_buffer(&self.words, 0, cast_slice(&words.0)))?;
         let records = gpu.upload("the scene's materials and emitters", cast_slice(&records.0))?;
-        let group = group(gpu, &self.layout, params, [&self.tree, &self.facets, &self.words, &records])?;
-        Ok(Self { records, params, group, ..self.clone() })
+        let group = group(gpu, &self.layout, params, &shapes, [&self.words, &records])?;
+        Ok(Self { shapes, records, params, group, ..self.clone() })
     }
 
     /// What it takes on the device, bytes.
     pub(crate) fn bytes(&self) -> u64 {
-        [&self.tree, &self.facets, &self.words, &self.records].map(wgpu::Buffer::size).iter().sum()
+        [&self.shapes.tree, &self.shapes.facets, &self.words, &self.records].map(wgpu::Buffer::size).iter().sum()
     }
 
     /// The buffer that the light map lies in, and the word where it begins: three floats a texel, all of the front and then of the back.
@@ -234,10 +230,6 @@ fn check(world: &World) -> Result<()> {
             world.scene.geometry.rounds.len()
         )));
     }
-    if world.added.is_some() || world.relit {
-        let message = "the GPU has no shapes and no area lights beside those of the scene file; use --device cpu";
-        return Err(Error::Request(message.into()));
-    }
     let is_pattern = |e: &Emitter| matches!(e, Emitter::Projector { .. } | Emitter::Spot { pattern: Some(_), .. });
     if world.scene.emitters.iter().any(is_pattern) {
         let message = "the GPU has no projector and no spot with a texture; use --device cpu";
@@ -246,14 +238,19 @@ fn check(world: &World) -> Result<()> {
     Ok(())
 }
 
-fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, params: SceneParams, buffers: [&wgpu::Buffer; 4]) -> Result<wgpu::BindGroup> {
+fn group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    params: SceneParams,
+    Shapes { tree, facets, .. }: &Shapes,
+    [words, records]: [&wgpu::Buffer; 2],
+) -> Result<wgpu::BindGroup> {
     let params = gpu.uniform("the scene's parameters", &params)?;
-    let [tree, facets, words, records] = buffers;
     gpu.checked(|| gpu.group(layout, &[&params, tree, facets, words, records]))
 }
 
 /// Fills the lists of records and of words; where they begin. Without a light map.
-fn params(world: &World, records: &mut Records, words: &mut Words) -> Result<SceneParams> {
+fn params(world: &World, shapes: &Shapes, records: &mut Records, words: &mut Words) -> Result<SceneParams> {
     let sobol = words.extend((0..16).flat_map(|i| (0..4).map(move |d| sobol_burley::parts::sobol_rev(1 << (31 - i), d))));
     let albedos = [Distribution::Beckmann, Distribution::Ggx].map(|d| albedo::table(d).iter().flat_map(|v| v.to_array()));
     let albedo = words.floats(albedos.into_iter().flatten());
@@ -278,7 +275,9 @@ fn params(world: &World, records: &mut Records, words: &mut Words) -> Result<Sce
         environment_count: environments.len() as u32,
         has_near: u32::from(!world.lights.tree.is_empty()),
         suns: world.lights.suns.len() as u32,
-        corners: 0,
+        corners: shapes.corners,
+        triangles: shapes.triangles,
+        added: shapes.added,
         sun_list,
         sobol,
         albedo,
@@ -288,52 +287,4 @@ fn params(world: &World, records: &mut Records, words: &mut Words) -> Result<Sce
         light_back: NONE,
         light_corners: NONE,
     })
-}
-
-/// The compressed tree, five entries a node, and from the given entry on three vectors a primitive: the bits of its corners, with the
-/// triangle, its material if that lets rays through, and its object.
-fn tree(world: &World) -> Result<(Vec<[u32; 4]>, u32)> {
-    let geometry = &world.scene.geometry;
-    let (tree, triangles) = world.bvh.compressed(geometry);
-    if depth(&tree) > STACK {
-        return Err(Error::Request(format!(
-            "the scene's tree is more than {STACK} nodes deep, too deep for the GPU; use --device cpu"
-        )));
-    }
-    let mut entries: Vec<[u32; 4]> = cast_slice(&tree.nodes).to_vec();
-    let corners = entries.len() as u32;
-    entries.extend(triangles.iter().flat_map(|&t| {
-        let [a, b, c] = geometry.corners(t);
-        let object = geometry.triangle_object[t as usize];
-        let material = geometry.objects[object as usize].material;
-        let masked = world.scene.materials[material as usize].opacity.is_some();
-        let material = if masked { material } else { NONE };
-        [(a, t), (b, material), (c, object)].map(|(p, word)| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits(), word])
-    }));
-    Ok((entries, corners))
-}
-
-/// A facet's seven vectors.
-fn words_of(facet: &Facet) -> [u32; 28] {
-    let mut words = [0; 28];
-    let vectors = facet.corners.iter().chain(&facet.normals).flat_map(|v| v.to_array());
-    let floats = vectors.chain(facet.uvs.iter().flat_map(|v| v.to_array()));
-    for (word, value) in words.iter_mut().zip(floats) {
-        *word = value.to_bits();
-    }
-    words[24..].copy_from_slice(&[facet.object, facet.material, facet.emitter.map_or(0, |e| e.get()), facet.extent.to_bits()]);
-    words
-}
-
-/// Nodes from the root to the deepest leaf.
-fn depth(tree: &CwBvh) -> usize {
-    let mut deepest = 0;
-    let mut todo = vec![(0, 1)];
-    while let Some((node, level)) = todo.pop() {
-        let Some(node) = tree.nodes.get(node) else { continue };
-        deepest = deepest.max(level);
-        let children = node.imask.count_ones();
-        todo.extend((0..children).map(|i| ((node.child_base_idx + i) as usize, level + 1)));
-    }
-    deepest
 }

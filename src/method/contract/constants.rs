@@ -14,7 +14,7 @@ use crate::method::many_light::{
     adaptive, bounce, disc, emit, gather as many_lights_gather, gpu as gpu_many_light, params as many_light_params,
     shade as many_lights_shade,
 };
-use crate::method::radiance_probes::{gpu as gpu_radiance_probes, seen, shade as shade_of_radiance_probes};
+use crate::method::radiance_probes::{gpu as gpu_radiance_probes, light, seen, shade as shade_of_radiance_probes, volume};
 use crate::method::{image_space_gather, ulr};
 use crate::probe::{neighbors, parameter_map as qhmap};
 use crate::transport::{bvh, light_tree, path, sampler};
@@ -151,6 +151,7 @@ fn twins(file: &str) -> Twins {
         "many_light/reflected.wgsl" => twins! { VIEWS = emit::VIEWS; },
         "path_trace/add_guides.wgsl" => twins! { ENVIRONMENT_DEPTH = denoise::FAR; },
         "path_trace/denoise.wgsl" => twins! { MIN_ALBEDO = denoise::MIN_ALBEDO; },
+        "radiance_probes/blockers.wgsl" => twins! { BLOCKER = light::BLOCKER; },
         "radiance_probes/fill_ring.wgsl" => twins! { CORNER = fill::CORNER; },
         "radiance_probes/first_order.wgsl" => twins! {
             DIRECTIONS = shade_of_radiance_probes::DIRECTIONS;
@@ -161,6 +162,8 @@ fn twins(file: &str) -> Twins {
             RECEIVER_WORDS = gpu_radiance_probes::RECEIVER_WORDS;
             BACK_BIT = receivers::BACK_BIT;
         },
+        "radiance_probes/taps.wgsl" => twins! { VOLUME_NUMBERS = volume::NUMBERS; },
+        "radiance_probes/volume.wgsl" => twins! { VOLUME_DIRECTIONS = volume::DIRECTIONS; },
         "shared/albedo.wgsl" => twins! {
             ALBEDO_COSINES = albedo::COSINES;
             ALBEDO_ALPHAS = albedo::ALPHAS;

@@ -9,11 +9,14 @@ use crate::method::light_field_probes::gpu as light_field_probes;
 use crate::method::lightmap_rt::gpu as lightmap_rt;
 use crate::method::many_light::gpu::{lights as many_lights, pixels as many_light_pixels};
 use crate::method::path_trace::{denoise_gpu as denoise, gpu as path_trace};
-use crate::method::radiance_probes::gpu::{self as radiance_probes, first_order, light_map, operator};
+use crate::method::radiance_probes::gpu::{self as radiance_probes, added, clusters, first_order, light_map, operator};
 use crate::method::ulr::gpu as ulr;
 
 /// The records of all kernels. A file of shaders/ that none of them needs fails the test.
 pub(crate) const KERNELS: &[&KernelSpec] = &[
+    &added::ADDED_LIGHT,
+    &added::BLOCKERS,
+    &added::BLOCKER_RADIANCE,
     &fill::FILL,
     &composite::LAYERS,
     &coverage::COVER,
@@ -54,10 +57,10 @@ pub(crate) const KERNELS: &[&KernelSpec] = &[
     &light_map::MAP_LIGHT,
     &mirror::MIRROR_PASS,
     &mirror_light::MIRROR_LIGHT,
-    &operator::CLUSTER_PROJECTION,
+    &clusters::CLUSTER_PROJECTION,
+    &clusters::RECONSTRUCT,
     &operator::PROBE_RELIGHT,
     &operator::RECEIVER_RADIANCE,
-    &operator::RECONSTRUCT,
     &path_trace::ADD_SAMPLES,
     &path_trace::CAMERA_HITS,
     &radiance_probes::RECEIVER_LIGHT,

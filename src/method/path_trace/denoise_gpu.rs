@@ -170,6 +170,12 @@ impl Denoiser {
         Ok(Self { guides, filter, params: *params, scene })
     }
 
+    /// Takes a frame of the scene.
+    pub fn rebind(&mut self, scene: Arc<GpuScene>) {
+        self.guides.rebind(&scene);
+        self.scene = scene;
+    }
+
     /// The guides of a frame, as [`crate::view::denoise::guides`] has them; a dispatch for each of a pixel's rays.
     pub fn guides(&self, camera: &Camera, spp: u32, seed: u32, frame: u32) -> Result<GpuGuides> {
         let gpu = &self.scene.gpu;

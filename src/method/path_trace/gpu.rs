@@ -11,6 +11,7 @@ use crate::gpu::scene::GpuScene;
 use crate::gpu::spec::{Access, KernelSpec, StructLayout, layout};
 use crate::material::bsdf::{Lobes, Query};
 use crate::scene::Camera;
+use crate::transport::World;
 use crate::transport::follow::PathStart;
 use crate::transport::path::PathParams;
 use crate::view::layers::LayerImages;
@@ -89,6 +90,15 @@ impl PathTracer {
     /// The device's name.
     pub fn device(&self) -> &str {
         self.scene.device()
+    }
+
+    /// Takes a frame's world, which is what the next frames are of; its scene on the device.
+    pub fn relight(&mut self, world: &World) -> Result<Arc<GpuScene>> {
+        let scene = Arc::new(self.scene.at(world)?);
+        self.hits.rebind(&scene);
+        self.paths.iter_mut().for_each(|paths| paths.rebind(scene.clone()));
+        self.scene = scene.clone();
+        Ok(scene)
     }
 
     /// The full image, as [`crate::method::path_trace::path_trace_full`] renders it.

@@ -144,16 +144,15 @@ impl Renderer for OnCpu<'_> {
     }
 }
 
-struct OnGpu {
+struct OnGpu<'a> {
+    setup: Setup<'a>,
     tracer: PathTracer,
     denoiser: Option<Denoiser>,
     layers: LayerChoice,
-    seed: u32,
 }
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     check_lit(setup)?;
-    setup.refuse_animation("the GPU's path tracer")?;
     let Params { path_trace, layers, denoise, .. } = setup.parameters()?;
     if path_trace.filter != Filter::Box {
         return Err(Error::Request("the GPU's path tracer has a box filter alone; use --device cpu".into()));
@@ -161,13 +160,33 @@ fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let scene = Arc::new(GpuScene::new(gpu, setup.world)?);
     let denoiser = denoise.map(|d| Denoiser::new(scene.clone(), &d)).transpose()?;
     let tracer = PathTracer::new(scene, &path_trace.path, layers == LayerChoice::All)?;
-    Ok(Box::new(OnGpu { tracer, denoiser, layers, seed: setup.seed }))
+    let mut frames = OnGpu { setup: *setup, tracer, denoiser, layers };
+    // What the GPU lacks shows in any frame.
+    if let Some(view) = setup.views.first() {
+        frames.relight(view)?;
+    }
+    Ok(Box::new(frames))
 }
 
-impl Renderer for OnGpu {
+impl OnGpu<'_> {
+    /// Takes the frame's world; whether that is another one than the scene's.
+    fn relight(&mut self, view: &View) -> Result<bool> {
+        let Some(world) = self.setup.world_at(view) else { return Ok(false) };
+        let scene = self.tracer.relight(&world)?;
+        if let Some(denoiser) = &mut self.denoiser {
+            denoiser.rebind(scene);
+        }
+        Ok(true)
+    }
+}
+
+impl Renderer for OnGpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, spp: u32, progress: &dyn Progress) -> Result<Frame> {
-        let (View { frame, camera }, seed) = (view, self.seed);
+        let (View { frame, camera }, seed) = (view, self.setup.seed);
         let mut clock = Clock::start();
+        if self.relight(view)? {
+            clock.lap("world");
+        }
         if self.layers == LayerChoice::Full {
             let full = self.tracer.full(camera, spp, seed, *frame, progress)?;
             clock.lap("path_trace");

@@ -179,6 +179,9 @@ impl Lighting {
     }
 }
 
+/// Of the random stream of a blocker.
+pub(crate) const BLOCKER: u32 = 2;
+
 /// A surface that a frame adds in the way of a relight ray. *Ours*: it sends diffuse light back along the ray; in the paper it is black.
 struct Blocker {
     /// `diffuse_out` over π.
@@ -195,7 +198,7 @@ impl Blocker {
         let of = |(i, (surface, wo)): (usize, &(Surface, Vec3))| {
             let wi = surface.frame.to_local(*wo);
             let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(surface, wi) * FRAC_1_PI;
-            let mut sampler = Sampler::new(hash_words(&[seed, i as u32, 2]), 0);
+            let mut sampler = Sampler::new(hash_words(&[seed, i as u32, BLOCKER]), 0);
             let direct = transmitted_irradiance(world, surface, wi.z < 0.0, None, &PathParams::DIRECT, &mut sampler);
             Self { out, direct, taps: volume.map_or_else(Vec::new, |v| v.taps(world, surface, *wo)) }
         };

@@ -26,7 +26,7 @@ pub const NUMBERS: usize = terms(ORDER);
 const _: () = assert!(NUMBERS <= MOST_NUMBERS);
 
 /// Directions by which light enters a coat.
-const DIRECTIONS: u32 = 8;
+pub(crate) const DIRECTIONS: u32 = 8;
 
 /// Most points of a grid.
 const MOST_POINTS: f64 = (1 << 22) as f64;

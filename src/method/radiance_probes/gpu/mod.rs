@@ -1,5 +1,7 @@
 //! Frames by radiance probes on a device: the twin of [`super::light`] and of what `render-path` makes of it.
 
+pub(crate) mod added;
+pub(crate) mod clusters;
 pub(crate) mod first_order;
 pub(crate) mod light_map;
 pub(crate) mod operator;
@@ -23,6 +25,7 @@ use crate::lightmap::LightMap;
 use crate::lightmap::receivers::{POINTS, Receiver};
 use crate::scene::Camera;
 use crate::transport::World;
+use added::{AddedLight, GpuBlockers};
 use bytemuck::{Pod, Zeroable, cast_slice};
 use first_order::FirstOrder;
 use glam::Vec4;
@@ -61,8 +64,13 @@ pub struct RadianceProbesOnGpu {
     receivers: wgpu::Buffer,
     count: u32,
     operator: GpuOperator,
+    blockers: GpuBlockers,
     map: MapLight,
     direct: DirectLight,
+    /// Where there are receivers in free space.
+    added_light: Option<AddedLight>,
+    /// Whether the frame adds shapes.
+    has_added: bool,
     /// Where receivers keep sh1.
     first_order: Option<FirstOrder>,
     params: RadianceProbeParams,
@@ -78,6 +86,8 @@ pub struct Passes {
     pub spaces: Vec<Rgb>,
     /// What comes to each receiver by way of the probes, as many numbers as it keeps.
     pub indirect: Vec<Rgb>,
+    /// The same in free space; empty without a volume.
+    pub volume: Vec<Rgb>,
 }
 
 impl RadianceProbesOnGpu {
@@ -99,6 +109,9 @@ impl RadianceProbesOnGpu {
             receiver_light: Kernel::in_scene(scene, &RECEIVER_LIGHT, &[("IRRADIANCE", 1.0)])?,
             receivers: gpu.upload("receivers", cast_slice(&words))?,
             count: transport.receivers.len() as u32,
+            blockers: GpuBlockers::new(scene, operator.volume.as_ref())?,
+            added_light: operator.volume.as_ref().map(|_| AddedLight::new(scene)).transpose()?,
+            has_added: false,
             operator,
             map: MapLight::new(scene, &map, numbers as u32)?,
             first_order: (transport.params.receiver == Kept::Sh1).then(|| FirstOrder::new(scene)).transpose()?,
@@ -128,7 +141,8 @@ impl RadianceProbesOnGpu {
         self.operator.pieces()
     }
 
-    /// Takes the lights and colours of a frame's world. An error where it adds shapes.
+    /// Takes the lights, colours and shapes of a frame's world. What relight rays meet of the latter the host finds: they are few, and each ray
+    /// asks their tree alone whether it is blocked.
     pub fn relight(&mut self, world: &World, lighting: &Lighting) -> Result<()> {
         let scene = self.baseline.scene.at(world)?;
         self.receiver_light.rebind(&scene);
@@ -136,6 +150,13 @@ impl RadianceProbesOnGpu {
         if let Some(first_order) = &mut self.first_order {
             first_order.rebind(&scene);
         }
+        if let Some(added_light) = &mut self.added_light {
+            added_light.rebind(&scene);
+        }
+        let (hits, blockers) = lighting.transport.hits_in(world);
+        self.operator.set_hits(&scene.gpu, &hits, blockers.len())?;
+        self.blockers.set(&scene, &blockers, self.count)?;
+        self.has_added = world.has_added();
         if lighting.changes() {
             self.operator.set_reflectance(&scene.gpu, &lighting.reflectances(world))?;
         }
@@ -155,7 +176,8 @@ impl RadianceProbesOnGpu {
         let gpu = &*scene.gpu;
         gpu.checked(|| {
             self.light_receivers(scene, commands, seed)?;
-            self.operator.run(gpu, commands, self.params.bounces, goes_on);
+            self.blockers.light(scene, commands, seed)?;
+            self.operator.run(gpu, commands, (self.params.bounces, goes_on), &self.blockers);
             Ok(())
         })
         .flatten()
@@ -167,12 +189,16 @@ impl RadianceProbesOnGpu {
         let gpu = &*scene.gpu;
         let mut commands = Commands::new(gpu);
         self.light_with(&scene, &mut commands, (seed, goes_on))?;
-        gpu.checked(|| self.map.run(&scene, &mut commands, &self.operator.indirect))?;
+        gpu.checked(|| self.map.run(&scene, &mut commands, &self.operator.clusters.light))?;
         let (direct, first_order, samples) = (&self.direct, &self.first_order, self.params.direct_samples);
+        let added_light = self.added_light.as_ref().zip(self.operator.volume.as_ref()).filter(|_| self.has_added);
         self.baseline.frame(camera, false, commands, |commands, camera: &Camera, target: &Target| {
             match first_order {
                 Some(first_order) => first_order.run(&scene, commands, (camera, target), samples, [seed, frame])?,
                 None => gpu.clear(&target.glossy),
+            }
+            if let Some((added_light, volume)) = added_light {
+                added_light.run(&scene, commands, (camera, target), volume)?;
             }
             direct.run(&scene, (commands, "diffuse"), (camera, &target.view), samples, [seed, frame])
         })
@@ -192,9 +218,17 @@ impl RadianceProbesOnGpu {
     /// Reads back what passes have left.
     pub fn passes(&self) -> Result<Passes> {
         let gpu = &self.baseline.scene.gpu;
-        let read = |buffer| Ok(gpu.read::<Vec4>(buffer)?.iter().map(|v| v.truncate()).collect());
-        let GpuOperator { direct, lambda, spaces, indirect, .. } = &self.operator;
-        Ok(Passes { direct: read(direct)?, lambda: read(lambda)?, spaces: read(spaces)?, indirect: read(indirect)? })
+        let read = |buffer: &wgpu::Buffer| {
+            Ok::<Vec<Rgb>, crate::Error>(gpu.read::<Vec4>(buffer)?.iter().map(|v| v.truncate()).collect())
+        };
+        let GpuOperator { direct, lambda, clusters, volume, .. } = &self.operator;
+        Ok(Passes {
+            direct: read(direct)?,
+            lambda: read(lambda)?,
+            spaces: read(&clusters.spaces)?,
+            indirect: read(&clusters.light)?,
+            volume: volume.as_ref().map_or_else(|| Ok(Vec::new()), |volume| read(&volume.clusters.light))?,
+        })
     }
 }
 
