@@ -9,8 +9,8 @@ pub(crate) mod pixels;
 use super::ManyLightParams;
 use super::bounce::Structure;
 use super::emit::Site;
-use super::params::Kernel as LobeShape;
-use crate::Result;
+use super::gather;
+use super::params::{Kernel as LobeShape, Traversal};
 use crate::gpu::Gpu;
 use crate::gpu::camera::GpuCamera;
 use crate::gpu::commands::Commands;
@@ -20,6 +20,7 @@ use crate::gpu::view::direct::DirectLight;
 use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
 use crate::scene::Camera;
 use crate::transport::World;
+use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use lights::GpuLights;
 use pixels::GpuPixels;
@@ -81,6 +82,23 @@ fn constants(params: &ManyLightParams) -> [(&'static str, f64); 2] {
     [("GAUSSIAN", f64::from(u8::from(is_gaussian))), ("SHADOW_RAYS", params.shadow_rays.into())]
 }
 
+/// An error where a gather may take more rounds of its loops than a software device makes: Mesa's llvmpipe leaves all loops of an invocation
+/// after 65,535 rounds, and says nothing.
+fn check_rounds(gpu: &Gpu, nodes: usize, params: &ManyLightParams) -> Result<()> {
+    const MOST: usize = 65_535;
+    // A node's own, and those of the walk down its receiver's material; of a tree, a traversal sees a tenth or less.
+    const ROUNDS: usize = 8;
+    let seen = if params.traversal == Traversal::Leaves { nodes } else { nodes / 10 };
+    let directions = if params.sphere > 0.0 { gather::CONE as usize } else { 1 };
+    if gpu.adapter.name.contains("llvmpipe") && ROUNDS * seen * directions > MOST {
+        return Err(Error::Request(format!(
+            "GPU \"{}\" ends loops after {MOST} rounds, and gathers from so many lights may take more: fewer vpls, or --device cpu",
+            gpu.adapter.name
+        )));
+    }
+    Ok(())
+}
+
 /// Renders frames on a device.
 pub struct ManyLightOnGpu {
     baseline: Baseline,
@@ -103,6 +121,7 @@ pub struct Tally {
 impl ManyLightOnGpu {
     /// Uploads lights and compiles the passes.
     pub fn new(gpu: Arc<Gpu>, world: &World, of: (&[Site], &Structure), params: &ManyLightParams) -> Result<Self> {
+        check_rounds(&gpu, of.1.forest.nodes.len(), params)?;
         let baseline = Baseline::new(gpu, world, None, params.supersample)?;
         let scene = &*baseline.scene;
         Ok(Self {
