@@ -86,13 +86,18 @@ fn constants(params: &ManyLightParams) -> [(&'static str, f64); 2] {
 /// after 65,535 rounds, and says nothing.
 fn check_rounds(gpu: &Gpu, nodes: usize, params: &ManyLightParams) -> Result<()> {
     const MOST: usize = 65_535;
-    // A node's own, and those of the walk down its receiver's material; of a tree, a traversal sees a tenth or less.
-    const ROUNDS: usize = 8;
-    let seen = if params.traversal == Traversal::Leaves { nodes } else { nodes / 10 };
+    // More than any traversal has been seen to visit.
+    let visited = match params.traversal {
+        Traversal::Leaves => nodes,
+        Traversal::Full => nodes.min(6144),
+        Traversal::Cuts => nodes.min(1536),
+    };
+    // A node's own round, and those of the walks down a receiver's material: at lights there are two of these.
+    let rounds = if params.bounces > 1 { 20 } else { 6 };
     let directions = if params.sphere > 0.0 { gather::CONE as usize } else { 1 };
-    if gpu.adapter.name.contains("llvmpipe") && ROUNDS * seen * directions > MOST {
+    if gpu.adapter.name.contains("llvmpipe") && rounds * visited * directions > MOST {
         return Err(Error::Request(format!(
-            "GPU \"{}\" ends loops after {MOST} rounds, and gathers from so many lights may take more: fewer vpls, or --device cpu",
+            "GPU \"{}\" ends loops after {MOST} rounds, and gathers from so many lights may take more: ask for fewer vpls, or use --device cpu",
             gpu.adapter.name
         )));
     }
