@@ -113,15 +113,16 @@ fn unchecked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule
     let source = wgpu::ShaderSource::Wgsl(source.into());
     let descriptor = wgpu::ShaderModuleDescriptor { label: Some(entry), source };
     // SAFETY: every index is one of four kinds. Invocations past a list's end return first. Numbers of nodes, triangles, materials, models,
-    // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there: an entry's place
-    // is its list's first row, which `SceneParams` holds, plus its number times the rows of a record, and a member lies within its record
-    // by the constants of scene.wgsl, which the contract's test compares with the Rust types. Numbers of triangles at which paths start come
-    // from hits of the same scene, and those of probes' texels and of receivers were tested when the file was read. Samples that a pixel
-    // keeps are numbered below their most. Pixels, texels and table entries that are computed from coordinates are wrapped or clamped to
-    // their image or table,
-    // after the coordinates were tested for numbers; where that lies in `words` `GpuScene` has said. The traversal's stack is no deeper than
-    // `STACK`, which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the root down or up, or end with a path's
-    // depth, which the roulette bounds or its limit. tests/gpu runs the same kernels both ways.
+    // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there: an entry's
+    // place is its list's first row, which `SceneParams` holds, plus its number times the rows of a record, and a member lies within its
+    // record by the constants of scene.wgsl, which the contract's test compares with the Rust types. What a frame adds is numbered on from
+    // the scene's own, and tables of a triangle each that have its own alone are asked for no other (`is_added`). Numbers of triangles at
+    // which paths start come from hits of the same scene or frame, and those of probes' texels and of receivers were tested when the file
+    // was read. Samples that a pixel keeps are numbered below their most. Pixels, texels and table entries that are computed from
+    // coordinates are wrapped or clamped to their image or table, after the coordinates were tested for numbers; where that lies in `words`
+    // `GpuScene` has said. The traversal's stack is no deeper than `STACK`, which `GpuScene` tests trees for. Loops end: they count, or
+    // follow trees from the root down or up, or end with a path's depth, which the roulette bounds or its limit. tests/gpu runs the same
+    // kernels both ways.
     unsafe { gpu.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 

@@ -122,7 +122,13 @@ impl GpuClusters {
     }
 
     /// Makes the receivers' light of the probes' `lambda`, as parts of these two passes.
-    pub(super) fn run(&self, kernels: &ClusterKernels, commands: &mut Commands, lambda: &wgpu::Buffer, passes: [&'static str; 2]) {
+    pub(super) fn run(
+        &self,
+        kernels: &ClusterKernels,
+        commands: &mut Commands,
+        lambda: &wgpu::Buffer,
+        passes: [&'static str; 2],
+    ) {
         let Self { parts, spaces, light } = self;
         for part in parts.iter().filter(|part| part.row_count > 0) {
             let buffers = [&kernels.params, &part.rows, &part.probes, &part.projection, lambda, spaces];

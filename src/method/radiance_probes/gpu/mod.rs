@@ -25,8 +25,8 @@ use crate::lightmap::LightMap;
 use crate::lightmap::receivers::{POINTS, Receiver};
 use crate::scene::Camera;
 use crate::transport::World;
-use bytemuck::{Pod, Zeroable, cast_slice};
 use added::{AddedLight, GpuBlockers};
+use bytemuck::{Pod, Zeroable, cast_slice};
 use first_order::FirstOrder;
 use glam::Vec4;
 use light_map::MapLight;
@@ -218,7 +218,9 @@ impl RadianceProbesOnGpu {
     /// Reads back what passes have left.
     pub fn passes(&self) -> Result<Passes> {
         let gpu = &self.baseline.scene.gpu;
-        let read = |buffer: &wgpu::Buffer| Ok::<Vec<Rgb>, crate::Error>(gpu.read::<Vec4>(buffer)?.iter().map(|v| v.truncate()).collect());
+        let read = |buffer: &wgpu::Buffer| {
+            Ok::<Vec<Rgb>, crate::Error>(gpu.read::<Vec4>(buffer)?.iter().map(|v| v.truncate()).collect())
+        };
         let GpuOperator { direct, lambda, clusters, volume, .. } = &self.operator;
         Ok(Passes {
             direct: read(direct)?,
