@@ -115,14 +115,16 @@ fn unchecked(gpu: &Gpu, source: &str, entry: &'static str) -> wgpu::ShaderModule
     // SAFETY: every index is one of four kinds. Invocations past a list's end return first. Numbers of nodes, triangles, materials, models,
     // textures, emitters and tables come from the buffers that `GpuScene` fills, whose numbers name entries that are there: an entry's
     // place is its list's first row, which `SceneParams` holds, plus its number times the rows of a record, and a member lies within its
-    // record by the constants of scene.wgsl, which the contract's test compares with the Rust types. Numbers of triangles at which paths
-    // start come from hits of the same scene, and those of probes' texels and of receivers were tested when the file was read. Links among
-    // the nodes of many lights lead forward and no further than their number, their lights are those of the tree, and the list of pixels to
-    // be lit holds numbers of the view's pixels, plus 1, or 0 past its end; its places are counted, one a pixel at the most. Samples that a
-    // pixel keeps are numbered below their most. Pixels, texels and table entries that are computed from coordinates are wrapped or clamped
-    // to their image or table, after the coordinates were tested for numbers; where that lies in `words` `GpuScene` has said. The
-    // traversal's stack is no deeper than `STACK`, which `GpuScene` tests the tree for. Loops end: they count, or follow trees from the
-    // root down or up, or end with a path's depth, which the roulette bounds or its limit. tests/gpu runs the same kernels both ways.
+    // record by the constants of scene.wgsl, which the contract's test compares with the Rust types. What a frame adds is numbered on from
+    // the scene's own, and tables of a triangle each that have its own alone are asked for no other (`is_added`). Numbers of triangles at
+    // which paths start come from hits of the same scene or frame, and those of probes' texels and of receivers were tested when the file
+    // was read. Links among the nodes of many lights lead forward and no further than their number, their lights are those of the tree, and
+    // the list of pixels to be lit holds numbers of the view's pixels, plus 1, or 0 past its end; its places are counted, one a pixel at
+    // the most. Samples that a pixel keeps are numbered below their most. Pixels, texels and table entries that are computed from
+    // coordinates are wrapped or clamped to their image or table, after the coordinates were tested for numbers; where that lies in `words`
+    // `GpuScene` has said. The traversal's stack is no deeper than `STACK`, which `GpuScene` tests trees for. Loops end: they count, or
+    // follow trees from the root down or up, or end with a path's depth, which the roulette bounds or its limit. tests/gpu runs the same
+    // kernels both ways.
     unsafe { gpu.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 

@@ -100,6 +100,8 @@ const TWICE: &[Test] = tests![
     rays::a_scene_without_surfaces_has_no_hits,
     rays::closest_hits_are_the_cpus,
     rays::rays_go_on_through_alpha_masks_as_on_the_cpu,
+    shapes::of_two_hits_at_one_distance_the_scene_has_its_own,
+    shapes::probe_lit_frames_are_the_cpus,
     shapes::rays_meet_what_frames_add,
     shapes::traced_frames_are_the_cpus,
     ulr::lumigraphs_are_the_cpus,

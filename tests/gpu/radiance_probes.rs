@@ -27,18 +27,23 @@ fn apart(gpu: &[Rgb], cpu: &[Rgb]) -> f32 {
     gpu.iter().zip(cpu).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max) / size
 }
 
-fn lighting(world: &World, order: u32, relight_rays: u32) -> Lighting {
-    let (low, high) = world.scene.geometry.bounds();
-    let probes = (0..12)
-        .map(|i| low + (high - low) * Vec3::new((i % 3) as f32 + 0.6, (i / 6) as f32 + 0.7, (i / 3 % 2) as f32 + 0.8) / 3.2);
-    let params = TransportParams {
+/// A quick bake.
+pub fn small(order: u32, relight_rays: u32) -> TransportParams {
+    TransportParams {
         sh_order: order,
         rays: 48,
         relight_rays,
         atlas: AtlasParams { texel: Some(0.4), budget: 1 },
         compress: CompressParams { most_receivers: 200, error: 0.05, ..CompressParams::default() },
         ..TransportParams::default()
-    };
+    }
+}
+
+/// By twelve probes.
+pub fn lighting(world: &World, params: TransportParams) -> Lighting {
+    let (low, high) = world.scene.geometry.bounds();
+    let probes = (0..12)
+        .map(|i| low + (high - low) * Vec3::new((i % 3) as f32 + 0.6, (i / 6) as f32 + 0.7, (i / 3 % 2) as f32 + 0.8) / 3.2);
     Lighting::new(world, Bake::new(world, probes.collect(), &params, &Silent).unwrap().all(), None)
 }
 
@@ -48,7 +53,7 @@ pub fn every_pass_is_the_cpus(device: &Device) {
     let camera = Camera { size: [32, 18], ..world.scene.sensor.clone().unwrap() };
     // Terms of less than a workgroup's, as many, and more; numbers of rays that fill a tile, and that do not.
     for (order, rays, piece, bounces) in [(2, 768, u64::MAX, 1), (7, 1000, 40_000, 1), (9, 100, 1 << 27, 3)] {
-        let lighting = lighting(&world, order, rays);
+        let lighting = lighting(&world, small(order, rays));
         let transport = &lighting.transport;
         let params = RadianceProbeParams { bounces, map_samples: 5, ..RadianceProbeParams::default() };
         let mut on_gpu = RadianceProbesOnGpu::new(gpu.clone(), &world, &lighting, &params, piece).unwrap();
@@ -87,10 +92,12 @@ pub fn commands_render_them(device: &Device) {
         ("probes-lights", "--lights lights.json", 1e-3),
         ("probes-dark", "--lights dark.json", 1e-3),
         ("probes-first-order", "--probes out/first-order --lights lights.json", 1e-3),
+        ("probes-shapes", "--lights objects.json", 1e-3),
+        ("probes-volume", "--probes out/first-order --lights objects.json --set bounces=1 --set feedback=true", 1e-3),
         ("probes-feedback", "--lights lights.json --set bounces=1 --set feedback=true", 1e-3),
     ] {
         // Kernels are compiled for each; of those without checks, these two have all.
-        if device.checks == Checks::Off && !["probes", "probes-first-order"].contains(&name) {
+        if device.checks == Checks::Off && !["probes", "probes-volume"].contains(&name) {
             continue;
         }
         let (frames, timings) = device.baked().both(device, name, &format!("--method radiance-probes {options}"));
@@ -116,10 +123,10 @@ pub fn commands_render_them(device: &Device) {
         }
         assert!(timings["device"].is_string() && timings["gpu_probe_memory_bytes"].as_u64().unwrap() > 100_000);
     }
-    let output = device.baked().render("shapes", Some(device), "--method radiance-probes --lights objects.json");
+    let output = device.baked().render("gloss", Some(device), "--method radiance-probes --set gloss_samples=2");
     assert_eq!(output.status.code(), Some(2));
     assert!(
-        text(&output.stderr).contains("no shapes") && text(&output.stderr).contains("--device cpu"),
+        text(&output.stderr).contains("no gloss_samples") && text(&output.stderr).contains("--device cpu"),
         "{}",
         text(&output.stderr)
     );
