@@ -41,5 +41,5 @@ fn bounce(@builtin(global_invocation_id) id: vec3<u32>) {
     stand_at(sites[i]);
     let marks = hash_next(hash_next(hash_start(), params.seed), BOUNCE);
     let stream = hash_end(hash_next(hash_next(marks, params.bounce), sites[i].number));
-    emissions[params.lights + i] = merged(emissions[i], gather(here.p, stream).received, 1.0);
+    emissions[params.lights + i] = merged(emissions[i], gather(NO_CONE, stream).received, 1.0);
 }

@@ -1,7 +1,7 @@
 // Light at a point: a traversal of the nodes by solid angle, and what each sends there. Twin: src/method/many_light/gather.rs.
 //
 // Who includes it says what a receiver makes of light: the type `Received`, and the functions `nothing`, `added`, `weight_of` and `receive`; and
-// at which surface `here` it is.
+// at which surface `here` it is, with the normal `here_n` on its side.
 
 // #include "many_light/lobe.wgsl"
 // #include "many_light/node.wgsl"
@@ -34,6 +34,17 @@ struct Arrival {
     solid_angle: f32,
     radiance: vec3<f32>,
 }
+
+// Where a receiver's lobe is. Twin: method::many_light::descend::Cone.
+struct Cone {
+    axis: vec3<f32>,
+    cosine: f32,
+    sine: f32,
+    // Solid angle beyond which a node in it has to be taken apart.
+    most: f32,
+}
+
+const NO_CONE = Cone(vec3(0.0), 1.0, 0.0, FAR); // Own.
 
 // A node that stands for all, by chance.
 struct Held {
@@ -114,19 +125,42 @@ fn arriving_from_sphere(node: u32, w: vec3<f32>, cone: f32) -> Received {
     return sum;
 }
 
-// All that arrives at `p`. Random numbers, where there are any, are hashes of `stream`.
-fn gather(p: vec3<f32>, stream: u32) -> Gathered {
+// Whether a sphere of `radius` at `to` from the lobe's apex reaches into it.
+fn meets(cone: Cone, to: vec3<f32>, far: f32, radius: f32) -> bool {
+    let sine = min(radius / far, 1.0);
+    let cosine = sqrt(1.0 - sine * sine);
+    return dot(cone.axis, to) > far * (cone.cosine * cosine - cone.sine * sine);
+}
+
+// Whether a traversal goes on to a node's children. Twin: method::many_light::descend::Descent::goes_on.
+fn goes_on(node: u32, to: vec3<f32>, d2: f32, cone: Cone) -> bool {
+    if d2 < nodes[node].reach {
+        return true;
+    }
+    let area = nodes[node].area;
+    let r2 = area * FRAC_1_PI;
+    if d2 < nodes[node].horizon {
+        let height = dot(to, here_n);
+        let along = dot(nodes[node].n, here_n);
+        if height * height < (1.0 - along * along) * r2 {
+            return true;
+        }
+    }
+    return d2 < nodes[node].in_lobe && area > cone.most * d2 && meets(cone, to, sqrt(d2), sqrt(r2));
+}
+
+// All that arrives here, with this lobe. Random numbers, where there are any, are hashes of `stream`.
+fn gather(cone: Cone, stream: u32) -> Gathered {
     var sum = nothing();
     var held: array<Held, MOST_SHADOW_RAYS>;
     var total = 0.0;
-    var draws = 0u;
     var visited = 0u;
     var place = 0u;
     while place < params.nodes {
         visited++;
-        let to = nodes[place].p - p;
+        let to = nodes[place].p - here.p;
         let d2 = dot(to, to);
-        if d2 < nodes[place].reach {
+        if goes_on(place, to, d2, cone) {
             place++;
             continue;
         }
@@ -138,8 +172,7 @@ fn gather(p: vec3<f32>, stream: u32) -> Gathered {
             if weight > 0.0 && is_finite(weight) {
                 total += weight;
                 for (var ray = 0u; ray < SHADOW_RAYS; ray++) {
-                    draws++;
-                    if drawn(draws, stream) * total < weight {
+                    if drawn(place, ray, stream) * total < weight {
                         held[ray] = Held(received, weight, place);
                     }
                 }
@@ -150,9 +183,8 @@ fn gather(p: vec3<f32>, stream: u32) -> Gathered {
     for (var ray = 0u; ray < SHADOW_RAYS; ray++) {
         let chosen = held[ray];
         if chosen.weight > 0.0 {
-            draws++;
             let count = nodes[chosen.node].count;
-            let light = nodes[chosen.node].first + min(u32(drawn(draws, stream) * f32(count)), count - 1u);
+            let light = nodes[chosen.node].first + min(u32(drawn(params.nodes, ray, stream) * f32(count)), count - 1u);
             if traverse(spawn_to(here, sites[light].p), true).triangle == NO_TRIANGLE {
                 sum = added(sum, chosen.received, total / (chosen.weight * f32(SHADOW_RAYS)));
             }
@@ -161,7 +193,7 @@ fn gather(p: vec3<f32>, stream: u32) -> Gathered {
     return Gathered(sum, visited);
 }
 
-// Twin: method::many_light::gather::Choice::next.
-fn drawn(number: u32, stream: u32) -> f32 {
-    return unit(hash64(vec2(number, stream)).y);
+// Twin: method::many_light::gather::Choice::drawn.
+fn drawn(place: u32, ray: u32, stream: u32) -> f32 {
+    return unit(hash64(vec2(MOST_SHADOW_RAYS * place + ray, stream)).y);
 }

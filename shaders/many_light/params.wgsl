@@ -22,6 +22,18 @@ struct Params {
     max_exponent: f32,
     // Whether lights have glossy lobes.
     lobes: u32,
+    // Clusters of the tree; the last is that of all lights.
+    clusters: u32,
+    // Of all lights.
+    area: f32,
+    solid_angle: f32,
+    near: f32,
+    horizon: f32,
+    fill: f32,
+    mirror_alpha: f32,
+    mirror_rays: u32,
+    mirror_samples: u32,
+    direct_samples: u32,
     // Distance of a grid's pixels, and how many grids are coarser.
     step: u32,
     level: u32,

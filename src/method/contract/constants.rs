@@ -11,7 +11,7 @@ use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gp
 use crate::method::glossy_probes::{coverage, filter, footprint, perturb, previous, search};
 use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
 use crate::method::many_light::{
-    adaptive, bounce, disc, emit, gather as many_lights_gather, gpu as gpu_many_light, params as many_light_params,
+    adaptive, bounce, descend, disc, emit, follow, gather as many_lights_gather, params as many_light_params,
     shade as many_lights_shade,
 };
 use crate::method::radiance_probes::{gpu as gpu_radiance_probes, light, seen, shade as shade_of_radiance_probes, volume};
@@ -139,7 +139,7 @@ fn twins(file: &str) -> Twins {
             LEAST_WEIGHT = adaptive::LEAST_WEIGHT;
         },
         "many_light/expose.wgsl" => twins! { MIDDLE_GREY = adaptive::MIDDLE_GREY; },
-        "many_light/filter_lobes.wgsl" => twins! { NO_NODE = gpu_many_light::lights::NO_NODE; },
+        "many_light/follow_lobes.wgsl" => twins! { RAY = follow::RAY; STRAIGHT = follow::STRAIGHT; },
         "many_light/gather.wgsl" => twins! {
             MOST_SHADOW_RAYS = many_light_params::MOST_SHADOW_RAYS;
             CONE = many_lights_gather::CONE;
@@ -148,6 +148,7 @@ fn twins(file: &str) -> Twins {
             DISC_FAR = disc::FAR;
         },
         "many_light/light_pixels.wgsl" => twins! { PIXEL = many_lights_shade::PIXEL; },
+        "many_light/receive.wgsl" => twins! { LOBE_END = descend::LOBE_END; },
         "many_light/reflected.wgsl" => twins! { VIEWS = emit::VIEWS; },
         "path_trace/add_guides.wgsl" => twins! { ENVIRONMENT_DEPTH = denoise::FAR; },
         "path_trace/denoise.wgsl" => twins! { MIN_ALBEDO = denoise::MIN_ALBEDO; },

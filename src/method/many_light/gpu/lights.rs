@@ -21,9 +21,6 @@ use bytemuck::{Pod, Zeroable, cast_slice};
 /// Paths as long as a gather takes: what runs of them are counted by.
 pub(super) const GATHER_PATHS: u32 = 16;
 
-/// A cluster that is no node.
-pub(crate) const NO_NODE: u32 = u32::MAX;
-
 /// `Site` of site.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -36,13 +33,21 @@ pub(super) struct GpuSite {
     side: f32,
 }
 
-/// `Cluster` of filter_lobes.wgsl.
+/// `Cluster` of add_up.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct GpuCluster {
     children: [u32; 2],
-    node: u32,
     area: f32,
+    padding: u32,
+}
+
+/// `Origin` of filter_nodes.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Origin {
+    cluster: u32,
+    is_last: u32,
 }
 
 /// `Emission` of lobe.wgsl.
@@ -70,16 +75,19 @@ pub(super) struct GpuNode {
     direction: [f32; 3],
     exponent: f32,
     magnitude: [f32; 3],
+    horizon: f32,
+    in_lobe: f32,
     first: u32,
     count: u32,
-    padding: [u32; 3],
+    padding: u32,
 }
 
 pub(super) const SITE: StructLayout = layout!(GpuSite as "Site" { p, number, triangle, u, v, side });
-const CLUSTER: StructLayout = layout!(GpuCluster as "Cluster" { children, node, area });
+const CLUSTER: StructLayout = layout!(GpuCluster as "Cluster" { children, area });
+const ORIGIN: StructLayout = layout!(Origin as "Origin" { cluster, is_last });
 const EMISSION: StructLayout = layout!(GpuEmission as "Emission" { diffuse, count, directions, exponents, magnitudes, weight });
 pub(super) const NODE: StructLayout =
-    layout!(GpuNode as "Node" { p, reach, n, area, diffuse, skip, direction, exponent, magnitude, first, count });
+    layout!(GpuNode as "Node" { p, reach, n, area, diffuse, skip, direction, exponent, magnitude, horizon, in_lobe, first, count });
 
 /// Light straight from emitters that lights send on.
 pub(crate) const SAMPLE_LIGHTS: KernelSpec = KernelSpec {
@@ -90,14 +98,23 @@ pub(crate) const SAMPLE_LIGHTS: KernelSpec = KernelSpec {
     bindings: &[("params", Uniform), ("sites", Read), ("emissions", ReadWrite)],
     structs: &[&PARAMS, &CAMERA, &SITE, &EMISSION],
 };
-/// Lobes of clusters.
-pub(crate) const FILTER_LOBES: KernelSpec = KernelSpec {
-    file: "many_light/filter_lobes.wgsl",
+/// Light of clusters.
+pub(crate) const ADD_UP: KernelSpec = KernelSpec {
+    file: "many_light/add_up.wgsl",
     twin: "src/method/many_light/gather.rs: new",
     workgroup: [64, 1],
     scene: false,
-    bindings: &[("params", Uniform), ("clusters", Read), ("emissions", Read), ("sums", ReadWrite), ("nodes", ReadWrite)],
-    structs: &[&PARAMS, &CAMERA, &CLUSTER, &EMISSION, &NODE],
+    bindings: &[("params", Uniform), ("clusters", Read), ("emissions", Read), ("sums", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &CLUSTER, &EMISSION],
+};
+/// Lobes of nodes.
+pub(crate) const FILTER_NODES: KernelSpec = KernelSpec {
+    file: "many_light/filter_nodes.wgsl",
+    twin: "src/method/many_light/descend.rs: new",
+    workgroup: [64, 1],
+    scene: false,
+    bindings: &[("params", Uniform), ("origins", Read), ("sums", Read), ("nodes", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &ORIGIN, &EMISSION, &NODE],
 };
 /// Light that lights send on of one another's.
 pub(crate) const BOUNCE: KernelSpec = KernelSpec {
@@ -117,11 +134,15 @@ struct Placed {
     /// The first of each height, and how many.
     heights: Vec<(u32, u32)>,
     sums: wgpu::Buffer,
+    /// Which cluster each node is.
+    origins: wgpu::Buffer,
     nodes: wgpu::Buffer,
     /// Of light straight from emitters, and then of all light.
     emissions: wgpu::Buffer,
-    /// How many lights and nodes.
-    counts: [u32; 2],
+    /// How many lights, clusters and nodes.
+    counts: [u32; 3],
+    /// Of all lights.
+    area: f32,
 }
 
 /// Lights and what they send.
@@ -129,6 +150,7 @@ pub(super) struct GpuLights {
     placed: Placed,
     disc: wgpu::Buffer,
     sample: Kernel,
+    add_up: Kernel,
     filter: Kernel,
     bounce: Kernel,
 }
@@ -141,7 +163,8 @@ impl GpuLights {
             placed: Placed::new(gpu, of, params)?,
             disc: gpu.uniform("solid angles of discs", &disc)?,
             sample: Kernel::in_scene(scene, &SAMPLE_LIGHTS, &[])?,
-            filter: Kernel::new(gpu, &FILTER_LOBES)?,
+            add_up: Kernel::new(gpu, &ADD_UP)?,
+            filter: Kernel::new(gpu, &FILTER_NODES)?,
             bounce: Kernel::in_scene(scene, &BOUNCE, &constants(params))?,
         })
     }
@@ -158,13 +181,13 @@ impl GpuLights {
     }
 
     pub(super) fn bytes(&self) -> u64 {
-        let Placed { sites, clusters, sums, nodes, emissions, .. } = &self.placed;
-        [sites, clusters, sums, nodes, emissions].map(wgpu::Buffer::size).iter().sum()
+        let Placed { sites, clusters, sums, origins, nodes, emissions, .. } = &self.placed;
+        [sites, clusters, sums, origins, nodes, emissions].map(wgpu::Buffer::size).iter().sum()
     }
 
     /// How many nodes traversals see.
     pub(super) fn nodes(&self) -> u32 {
-        self.placed.counts[1]
+        self.placed.counts[2]
     }
 
     /// What kernels that gather bind after their parameters.
@@ -174,8 +197,8 @@ impl GpuLights {
 
     /// All light after so many bounces, ready to be gathered.
     pub(super) fn light(&self, gpu: &Gpu, commands: &mut Commands, base: &Params, bounces: u32) -> Result<()> {
-        let Placed { sites, emissions, counts: [lights, nodes], .. } = &self.placed;
-        let base = Params { lights: *lights, nodes: *nodes, ..*base };
+        let Placed { sites, emissions, counts: [lights, clusters, nodes], area, .. } = &self.placed;
+        let base = Params { lights: *lights, clusters: *clusters, nodes: *nodes, area: *area, ..*base };
         for (first, count) in runs(*lights, base.samples) {
             let params = gpu.uniform("parameters of lights", &Params { first, count, ..base })?;
             commands.run("light sampling", &self.sample, &[&params, sites, emissions], [count, 1]);
@@ -192,12 +215,16 @@ impl GpuLights {
         Ok(())
     }
 
-    /// Lobes of clusters, from the leaves up.
+    /// Light of clusters, from the leaves up, and then of nodes.
     fn filter(&self, gpu: &Gpu, commands: &mut Commands, base: &Params) -> Result<()> {
-        let Placed { clusters, heights, sums, nodes, emissions, .. } = &self.placed;
+        let Placed { clusters, heights, sums, origins, nodes, emissions, .. } = &self.placed;
         for &(first, count) in heights {
             let params = gpu.uniform("parameters of clusters", &Params { first, count, ..*base })?;
-            commands.run("filtering", &self.filter, &[&params, clusters, emissions, sums, nodes], [count, 1]);
+            commands.run("filtering", &self.add_up, &[&params, clusters, emissions, sums], [count, 1]);
+        }
+        for (first, count) in runs(base.nodes, 1) {
+            let params = gpu.uniform("parameters of nodes", &Params { first, count, ..*base })?;
+            commands.run("filtering", &self.filter, &[&params, origins, sums, nodes], [count, 1]);
         }
         Ok(())
     }
@@ -209,22 +236,26 @@ impl Placed {
         let words: Vec<GpuSite> = tree.order.iter().map(|&i| GpuSite::new(i, &sites[i as usize])).collect();
         let dark = vec![Emission::default(); sites.len()];
         let nodes: Vec<GpuNode> = Gather::new(tree, forest, &dark, params).nodes.iter().map(GpuNode::from).collect();
-        let (clusters, heights) = by_height(tree, &forest.nodes);
+        let (clusters, heights, places) = by_height(tree);
+        let origin = |(&i, &last): (&u32, &bool)| Origin { cluster: places[i as usize], is_last: last.into() };
+        let origins: Vec<Origin> = forest.nodes.iter().zip(&forest.last).map(origin).collect();
         let emission = size_of::<GpuEmission>() as u64;
         Ok(Self {
             sites: gpu.upload("virtual point lights", cast_slice(&words))?,
             clusters: gpu.upload("clusters", cast_slice(&clusters))?,
             heights,
             sums: gpu.output("light of clusters", emission * clusters.len().max(1) as u64)?,
+            origins: gpu.upload("clusters of nodes", cast_slice(&origins))?,
             nodes: gpu.upload("nodes", cast_slice(&nodes))?,
             emissions: gpu.output("light of lights", 2 * emission * sites.len().max(1) as u64)?,
-            counts: [sites.len() as u32, nodes.len() as u32],
+            counts: [sites.len(), clusters.len(), nodes.len()].map(|n| n as u32),
+            area: tree.clusters.first().map_or(0.0, |all| all.area),
         })
     }
 }
 
-/// Clusters by their height above the leaves, and the first of each height and how many.
-fn by_height(tree: &Tree, nodes: &[u32]) -> (Vec<GpuCluster>, Vec<(u32, u32)>) {
+/// Clusters by their height above the leaves; the first of each height and how many; and the place of each among them.
+fn by_height(tree: &Tree) -> (Vec<GpuCluster>, Vec<(u32, u32)>, Vec<u32>) {
     let all = &tree.clusters;
     let mut heights = vec![0u32; all.len()];
     for i in (0..all.len()).rev().filter(|&i| !all[i].is_leaf()) {
@@ -232,13 +263,12 @@ fn by_height(tree: &Tree, nodes: &[u32]) -> (Vec<GpuCluster>, Vec<(u32, u32)>) {
     }
     let mut order: Vec<usize> = (0..all.len()).collect();
     order.sort_by_key(|&i| heights[i]);
-    let (mut places, mut node_of) = (vec![0; all.len()], vec![NO_NODE; all.len()]);
+    let mut places = vec![0; all.len()];
     order.iter().zip(0..).for_each(|(&i, place)| places[i] = place);
-    nodes.iter().zip(0..).for_each(|(&i, node)| node_of[i as usize] = node);
     let cluster = |&i: &usize| GpuCluster {
         children: if all[i].is_leaf() { [all[i].first; 2] } else { [places[i + 1], places[all[i + 1].skip as usize]] },
-        node: node_of[i],
         area: all[i].area,
+        padding: 0,
     };
     let mut runs: Vec<(u32, u32)> = Vec::new();
     for (&i, place) in order.iter().zip(0..) {
@@ -247,7 +277,7 @@ fn by_height(tree: &Tree, nodes: &[u32]) -> (Vec<GpuCluster>, Vec<(u32, u32)>) {
             None => runs.push((place, 1)),
         }
     }
-    (order.iter().map(cluster).collect(), runs)
+    (order.iter().map(cluster).collect(), runs, places)
 }
 
 impl GpuSite {
@@ -263,7 +293,6 @@ impl From<&Node> for GpuNode {
         let [first, count] = node.lights;
         Self {
             p: node.p.to_array(),
-            reach: node.reach,
             n: node.n.to_array(),
             area: node.area,
             skip: node.skip,
@@ -282,8 +311,7 @@ mod tests {
     #[test]
     fn clusters_come_after_their_children_and_have_their_lights() {
         let tree = Tree::new(&room(777), 1);
-        let nodes = [5, 9];
-        let (clusters, heights) = by_height(&tree, &nodes);
+        let (clusters, heights, places) = by_height(&tree);
         assert_eq!(heights.iter().map(|h| h.1).sum::<u32>(), 2 * 777 - 1);
         assert_eq!(heights[0], (0, 777));
         let mut lights: Vec<Vec<u32>> = Vec::new();
@@ -298,10 +326,9 @@ mod tests {
         let mut whole = lights.last().unwrap().clone();
         whole.sort_unstable();
         assert!(whole.into_iter().eq(0..777));
-        for (i, node) in nodes.iter().enumerate() {
-            let at = clusters.iter().position(|c| c.node == i as u32).unwrap();
-            let cluster = &tree.clusters[*node as usize];
-            assert!(lights[at].iter().copied().eq(cluster.first..cluster.first + cluster.count));
+        for i in [0, 5, 9] {
+            let cluster = &tree.clusters[i];
+            assert!(lights[places[i] as usize].iter().copied().eq(cluster.first..cluster.first + cluster.count));
         }
     }
 }

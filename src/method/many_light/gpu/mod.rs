@@ -44,17 +44,28 @@ struct Params {
     min_exponent: f32,
     max_exponent: f32,
     lobes: u32,
+    clusters: u32,
+    area: f32,
+    solid_angle: f32,
+    near: f32,
+    horizon: f32,
+    fill: f32,
+    mirror_alpha: f32,
+    mirror_rays: u32,
+    mirror_samples: u32,
+    direct_samples: u32,
     step: u32,
     level: u32,
     bilateral: u32,
     lambda: f32,
     threshold: f32,
     diagonal: f32,
-    padding: u32,
+    padding: [u32; 3],
 }
 pub(crate) const PARAMS: StructLayout = layout!(Params as "Params" {
-    camera, seed, frame, first, count, lights, nodes, samples, bounce, sphere, clamp, min_exponent, max_exponent, lobes, step, level,
-    bilateral, lambda, threshold, diagonal
+    camera, seed, frame, first, count, lights, nodes, samples, bounce, sphere, clamp, min_exponent, max_exponent, lobes, clusters,
+    area, solid_angle, near, horizon, fill, mirror_alpha, mirror_rays, mirror_samples, direct_samples, step, level, bilateral, lambda, threshold,
+    diagonal
 });
 
 impl Params {
@@ -69,7 +80,15 @@ impl Params {
             clamp: params.clamp,
             min_exponent: params.min_exponent,
             max_exponent: params.max_exponent,
-            lobes: params.lobes.into(),
+            lobes: params.lobes,
+            solid_angle: params.solid_angle,
+            near: params.near,
+            horizon: params.horizon,
+            fill: params.fill,
+            mirror_alpha: params.mirror_alpha,
+            mirror_rays: params.mirror_rays,
+            mirror_samples: params.mirror_samples,
+            direct_samples: params.direct_samples,
             lambda: params.lambda,
             ..Self::zeroed()
         }
@@ -121,11 +140,16 @@ pub struct Tally {
     pub points: u32,
     /// The least, the most and the sum of the nodes that were visited for them.
     pub nodes: [u64; 3],
+    /// Pixels whose lobes rays follow.
+    pub mirrors: u32,
 }
 
 impl ManyLightOnGpu {
     /// Uploads lights and compiles the passes.
     pub fn new(gpu: Arc<Gpu>, world: &World, of: (&[Site], &Structure), params: &ManyLightParams) -> Result<Self> {
+        if params.lobes > 1 {
+            return Err(Error::Request("the GPU's many lights have one lobe a node; use --device cpu for more".into()));
+        }
         check_rounds(&gpu, of.1.forest.nodes.len(), params)?;
         let baseline = Baseline::new(gpu, world, None, params.supersample)?;
         let scene = &*baseline.scene;
@@ -182,6 +206,9 @@ impl ManyLightOnGpu {
             let base = Params { nodes: lights.nodes(), ..Params::new(camera, seeds, params) };
             pixels.light(gpu, commands, (&base, params), (lights, target))?;
             pixels.layers(gpu, commands, camera, target, (params.direct_samples, seeds))?;
+            if params.mirror_rays > 0 {
+                pixels.follow(gpu, commands, &base, (lights, target))?;
+            }
             direct.run(&scene, (commands, "direct"), (camera, &target.view), params.direct_samples, seeds)
         })?;
         Ok((frame, pixels.tally(gpu)?))

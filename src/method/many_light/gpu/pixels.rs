@@ -42,6 +42,18 @@ struct Grids {
     counts: [u32; GRIDS],
 }
 
+/// `Part` of tally.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Part {
+    points: u32,
+    least: u32,
+    most: u32,
+    sum: u32,
+    mirrors: u32,
+}
+
+const PART: StructLayout = layout!(Part as "Part" { points, least, most, sum, mirrors });
 const LIT_PIXEL: StructLayout = layout!(LitPixel as "LitPixel" { irradiance, visited, glossy, listed });
 const GRIDS_LAYOUT: StructLayout = layout!(Grids as "Grids" { exposure, counts });
 
@@ -81,14 +93,30 @@ pub(crate) const VIEW_LAYERS: KernelSpec = KernelSpec {
     bindings: &[("params", Uniform), ("view", Read), ("shading", ReadWrite), ("glossy", ReadWrite), ("lit", Read)],
     structs: &[&PIXEL_RUN, &CAMERA, &PIXEL, &REFLECTED, &SHADING, &LIT_PIXEL],
 };
+/// Rays along lobes.
+pub(crate) const FOLLOW_LOBES: KernelSpec = KernelSpec {
+    file: "many_light/follow_lobes.wgsl",
+    twin: "src/method/many_light/follow.rs: followed",
+    workgroup: [64, 1],
+    scene: true,
+    bindings: &[
+        ("params", Uniform),
+        ("disc", Uniform),
+        ("sites", Read),
+        ("nodes", Read),
+        ("view", Read),
+        ("glossy", ReadWrite),
+    ],
+    structs: &[&PARAMS, &CAMERA, &SITE, &NODE, &PIXEL, &REFLECTED],
+};
 /// Points and nodes.
 pub(crate) const TALLY: KernelSpec = KernelSpec {
     file: "many_light/tally.wgsl",
     twin: "src/method/many_light/row.rs: counts",
     workgroup: [256, 1],
     scene: false,
-    bindings: &[("lit", Read), ("tallies", ReadWrite)],
-    structs: &[&LIT_PIXEL],
+    bindings: &[("params", Uniform), ("view", Read), ("lit", Read), ("parts", ReadWrite)],
+    structs: &[&PARAMS, &CAMERA, &PIXEL, &REFLECTED, &LIT_PIXEL, &PART],
 };
 
 /// What lights a view.
@@ -97,9 +125,10 @@ pub(super) struct GpuPixels {
     expose: Kernel,
     light: Kernel,
     layers: Kernel,
+    follow: Kernel,
     tally: Kernel,
     grids: wgpu::Buffer,
-    tallies: wgpu::Buffer,
+    parts: wgpu::Buffer,
     /// Of the last view.
     lit: Option<wgpu::Buffer>,
     diagonal: f32,
@@ -114,9 +143,10 @@ impl GpuPixels {
             expose: Kernel::new(gpu, &EXPOSE)?,
             light: Kernel::in_scene(scene, &LIGHT_PIXELS, &constants(params))?,
             layers: Kernel::in_scene(scene, &VIEW_LAYERS, &[])?,
+            follow: Kernel::in_scene(scene, &FOLLOW_LOBES, &constants(params))?,
             tally: Kernel::new(gpu, &TALLY)?,
             grids: gpu.output("grids of pixels", size_of::<Grids>() as u64)?,
-            tallies: gpu.output("counts", LANES * size_of::<[u32; 4]>() as u64)?,
+            parts: gpu.output("counts", LANES * size_of::<Part>() as u64)?,
             lit: None,
             diagonal: lower.distance(upper),
         })
@@ -126,6 +156,7 @@ impl GpuPixels {
         self.choose.rebind(scene);
         self.light.rebind(scene);
         self.layers.rebind(scene);
+        self.follow.rebind(scene);
     }
 
     /// Indirect light of all pixels.
@@ -166,7 +197,8 @@ impl GpuPixels {
             step /= 2;
             level += 1;
         }
-        commands.run("gather", &self.tally, &[&lit, &self.tallies], [1, 1]);
+        let params = gpu.uniform("parameters of counts", &Params { count: width * height, ..base })?;
+        commands.run("gather", &self.tally, &[&params, &target.view.pixels, &lit, &self.parts], [1, 1]);
         self.lit = Some(lit);
         Ok(())
     }
@@ -189,13 +221,32 @@ impl GpuPixels {
         Ok(())
     }
 
+    /// Adds what rays along sharp lobes bring to the glossy layer.
+    pub(super) fn follow(
+        &self,
+        gpu: &Gpu,
+        commands: &mut Commands,
+        base: &Params,
+        (lights, target): (&GpuLights, &Target),
+    ) -> Result<()> {
+        let rays = base.mirror_rays * base.mirror_samples.max(1);
+        for (first, count) in runs(area(target.view.size) as u32, GATHER_PATHS.saturating_mul(rays)) {
+            let params = gpu.uniform("parameters of lobes", &Params { first, count, ..*base })?;
+            let [disc, sites, nodes] = lights.gathered();
+            let buffers = [&params, disc, sites, nodes, &target.view.pixels, &target.glossy];
+            commands.run("mirrors", &self.follow, &buffers, [count, 1]);
+        }
+        Ok(())
+    }
+
     /// What came of the sampling.
     pub(super) fn tally(&self, gpu: &Gpu) -> Result<Tally> {
-        let parts: Vec<[u32; 4]> = gpu.read(&self.tallies)?;
-        let of = |k: usize| parts.iter().map(move |part| part[k]);
-        let points = of(0).sum();
-        let least = if points > 0 { of(1).min() } else { None };
-        let sum = of(3).map(u64::from).sum();
-        Ok(Tally { points, nodes: [least.unwrap_or(0).into(), of(2).max().unwrap_or(0).into(), sum] })
+        let parts: Vec<Part> = gpu.read(&self.parts)?;
+        let points = parts.iter().map(|part| part.points).sum();
+        let least = parts.iter().map(|part| part.least).min().filter(|_| points > 0);
+        let most = parts.iter().map(|part| part.most).max();
+        let sum = parts.iter().map(|part| u64::from(part.sum)).sum();
+        let mirrors = parts.iter().map(|part| part.mirrors).sum();
+        Ok(Tally { points, nodes: [least.unwrap_or(0).into(), most.unwrap_or(0).into(), sum], mirrors })
     }
 }

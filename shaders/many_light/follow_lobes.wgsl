@@ -1,0 +1,97 @@
+// Twin of src/method/many_light/follow.rs: followed.
+// Adds what rays along the lobes of mirrors and polished surfaces bring back to the glossy layer of a run of pixels.
+
+// #include "many_light/receive.wgsl"
+// #include "shared/camera_ray.wgsl"
+// #include "shared/factors.wgsl"
+// #include "shared/mirror.wgsl"
+// #include "shared/path.wgsl"
+// #include "shared/view.wgsl"
+
+// Marks random numbers of rays along lobes.
+const RAY: u32 = 0x6d697272u;
+// Branch of a ray's stream: light straight from emitters where it ends.
+const STRAIGHT: u32 = 1u;
+
+@group(0) @binding(4) var<storage, read> view: array<Pixel>;
+@group(0) @binding(5) var<storage, read_write> glossy: array<vec4<f32>>;
+
+// The mean of so many samples of light straight from emitters. Twin: view::direct::direct_at.
+fn direct_at(hit: Hit, wo: vec3<f32>, count: u32, stream: u32) -> vec3<f32> {
+    var sum = vec3(0.0);
+    for (var k = 0u; k < count; k++) {
+        var s = sampler_new(stream, k);
+        sum += integrate(Start(hit, wo, Query(ALL_LOBES, 1.0), 0.0, true), PathParams(1u, NONE), &s);
+    }
+    return sum / f32(max(count, 1u));
+}
+
+// What a ray brings back that leaves a surface by its lobe, and those that follow it from mirror to mirror.
+fn along(first: Hit, seen_from: vec3<f32>, straight: u32, stream: u32) -> vec3<f32> {
+    var hit = first;
+    var wo = seen_from;
+    var sum = vec3(0.0);
+    var throughput = vec3(1.0);
+    var s = sampler_new(stream, 0u);
+    for (var left = params.mirror_rays; left > 0u; left--) {
+        var surface = surface_at(hit);
+        var d = vec3(0.0);
+        if params.mirror_samples == 0u {
+            d = mirror_direction(surface, wo);
+            throughput *= bsdf_glossy_albedo(surface, to_local(surface.frame, wo));
+        } else {
+            let u = next_4d(&s);
+            let drawn = scatter(surface, to_local(surface.frame, wo), vec3(0.0), u.z, u.xy, Query(NON_DIFFUSE, 1.0)).sample;
+            if !(drawn.pdf > 0.0) {
+                break;
+            }
+            d = to_world(surface.frame, drawn.wo);
+            throughput *= drawn.weight;
+        }
+        hit = traverse(spawn(surface, d), false);
+        if hit.triangle == NO_TRIANGLE {
+            break;
+        }
+        wo = -d;
+        surface = surface_at(hit);
+        let alpha = view_alpha(surface, to_local(surface.frame, wo).z > 0.0);
+        let goes_on = left > 1u && alpha >= 0.0 && is_followed(alpha);
+        let branch = hash_end(hash_next(hash_next(hash_start(), stream), left - 1u));
+        let light = gathered(surface, wo, select(alpha, -1.0, goes_on), branch).received;
+        var sent = light.irradiance * bsdf_diffuse_out(surface, to_local(surface.frame, wo)) * FRAC_1_PI;
+        if alpha >= 0.0 && !goes_on {
+            sent += light.glossy * bsdf_glossy_albedo(surface, to_local(surface.frame, wo));
+        }
+        sum += throughput * (sent + direct_at(hit, wo, straight, hash_end(hash_next(hash_next(hash_start(), branch), STRAIGHT))));
+        if !goes_on {
+            break;
+        }
+    }
+    return keep_finite(sum);
+}
+
+@compute @workgroup_size(64)
+fn follow_lobes(@builtin(global_invocation_id) id: vec3<u32>) {
+    scene = scene_params;
+    let i = params.first + id.x;
+    if id.x >= params.count {
+        return;
+    }
+    let pixel = view[i];
+    if pixel.material == NOT_GLOSSY || !is_followed(pixel.alpha) {
+        return;
+    }
+    let width = params.camera.width;
+    let wo = -camera_ray(params.camera, vec2(f32(i % width), f32(i / width)) + 0.5, vec2(0.5)).direction;
+    let marks = hash_end(hash_next(hash_next(hash_start(), params.seed), RAY));
+    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), marks), params.frame), i));
+    // All rays of a perfect mirror are the same.
+    let count = select(max(params.mirror_samples, 1u), 1u, pixel.alpha == 0.0);
+    let straight = (params.direct_samples + count - 1u) / count;
+    var sum = vec3(0.0);
+    for (var k = 0u; k < count; k++) {
+        let of_ray = hash_end(hash_next(hash_next(hash_start(), stream), k));
+        sum += along(hit_of(pixel.triangle, pixel.u, pixel.v), wo, straight, of_ray);
+    }
+    glossy[i] += vec4(sum / f32(count), 0.0);
+}
