@@ -8,7 +8,8 @@ use super::arrival::{Arrival, Received};
 use super::cuts::Forest;
 use super::disc;
 use super::emit::Emission;
-use super::lobe::{Lobe, LobeSum};
+use super::lobe::Lobe;
+use super::mixture::{MOST_LOBES, Mixture};
 use super::params::{Kernel, MOST_SHADOW_RAYS, ManyLightParams};
 use super::tree::Tree;
 use crate::base::math::{Basis, Rgb, hash64, unit};
@@ -36,7 +37,7 @@ pub struct Node {
     reach: f32,
     /// Mean diffuse radiance.
     diffuse: Rgb,
-    /// Mean glossy radiance.
+    /// Mean glossy radiance; the first lobe of a mixture.
     lobe: Lobe,
     /// Its lights in the tree's order: the first, and how many.
     pub lights: [u32; 2],
@@ -45,6 +46,8 @@ pub struct Node {
 /// The light of a frame, ready to be gathered.
 pub struct Gather {
     nodes: Vec<Node>,
+    /// Further lobes of each node, those without light last; empty where nodes have one.
+    more: Vec<[Lobe; MOST_LOBES - 1]>,
     sphere: f32,
     kernel: Kernel,
     shadow_rays: usize,
@@ -53,13 +56,11 @@ pub struct Gather {
 impl Gather {
     /// Of a tree's lights: means over each node's, by area, and filtered lobes (§2.1).
     pub fn new(tree: &Tree, forest: &Forest, emissions: &[Emission], params: &ManyLightParams) -> Self {
-        let mut sums = vec![(Rgb::ZERO, LobeSum::default()); tree.clusters.len()];
+        let mut sums = vec![(Rgb::ZERO, Mixture::default()); tree.clusters.len()];
         for (i, cluster) in tree.clusters.iter().enumerate().rev() {
             sums[i] = if cluster.is_leaf() {
                 let emission = &emissions[tree.order[cluster.first as usize] as usize];
-                let mut lobes = LobeSum::default();
-                lobes.add(&emission.lobes.filtered(), cluster.area);
-                (emission.diffuse * cluster.area, lobes)
+                (emission.diffuse * cluster.area, emission.lobes.refiltered(cluster.area))
             } else {
                 let (left, right) = (sums[i + 1], sums[tree.clusters[i + 1].skip as usize]);
                 let mut lobes = left.1;
@@ -69,22 +70,26 @@ impl Gather {
         }
         let node = |((&i, &skip), &last): ((&u32, &u32), &bool)| {
             let (cluster, (diffuse, lobes)) = (&tree.clusters[i as usize], &sums[i as usize]);
-            let (area, lobe) = (cluster.area.max(f32::MIN_POSITIVE), lobes.filtered());
+            let area = cluster.area.max(f32::MIN_POSITIVE);
+            let [lobe, more @ ..] = lobes.filtered().map(|lobe| Lobe { magnitude: lobe.magnitude / area, ..lobe });
             let wide = area / params.solid_angle;
             let reach = if last { wide.min(params.near * params.near * area / PI) } else { wide };
-            Node {
+            let node = Node {
                 p: cluster.p,
                 area,
                 n: cluster.n,
                 skip,
                 reach: if cluster.is_leaf() { 0.0 } else { reach },
                 diffuse: *diffuse / area,
-                lobe: Lobe { magnitude: lobe.magnitude / area, ..lobe },
+                lobe,
                 lights: [cluster.first, cluster.count],
-            }
+            };
+            (node, more)
         };
+        let (nodes, more) = forest.nodes.iter().zip(&forest.skip).zip(&forest.last).map(node).unzip();
         Self {
-            nodes: forest.nodes.iter().zip(&forest.skip).zip(&forest.last).map(node).collect(),
+            nodes,
+            more: if params.lobes > 1 { more } else { Vec::new() },
             sphere: params.sphere,
             kernel: params.kernel,
             shadow_rays: params.shadow_rays as usize,
@@ -112,10 +117,10 @@ impl Gather {
                 continue;
             }
             if self.shadow_rays == 0 {
-                self.arrivals(node, to, d2, |arrival| sum.add(&receive(arrival), 1.0));
+                self.arrivals(place, to, d2, |arrival| sum.add(&receive(arrival), 1.0));
             } else {
                 let mut of_node = R::default();
-                self.arrivals(node, to, d2, |arrival| of_node.add(&receive(arrival), 1.0));
+                self.arrivals(place, to, d2, |arrival| of_node.add(&receive(arrival), 1.0));
                 choice.offer(of_node, node.lights);
             }
             place = node.skip as usize;
@@ -131,7 +136,8 @@ impl Gather {
     }
 
     /// Light that a node sends along `-to`, which ends at the receiver.
-    fn arrivals(&self, node: &Node, to: Vec3, d2: f32, mut each: impl FnMut(&Arrival)) {
+    fn arrivals(&self, place: usize, to: Vec3, d2: f32, mut each: impl FnMut(&Arrival)) {
+        let node = &self.nodes[place];
         let distance = d2.sqrt();
         if distance <= f32::MIN_POSITIVE {
             return;
@@ -142,7 +148,7 @@ impl Gather {
             let sin = (radius * self.sphere / distance).min(1.0);
             let cone = TAU * (1.0 - (1.0 - sin * sin).sqrt());
             if cone > SMALL {
-                return self.sphere_arrivals(node, w, cone, each);
+                return self.sphere_arrivals(place, w, cone, each);
             }
         }
         let cos = -node.n.dot(w);
@@ -155,12 +161,13 @@ impl Gather {
         } else {
             node.area * cos / d2
         };
-        each(&Arrival { direction: w, solid_angle, radiance: node.radiance(self.kernel, -w) });
+        each(&Arrival { direction: w, solid_angle, radiance: self.radiance(place, -w) });
     }
 
     /// The same from a sphere (Hasan et al. 2009): the flux is spread over the cone that the sphere fills, and directions within it are
     /// evaluated one by one. *Ours*: eight fixed ones.
-    fn sphere_arrivals(&self, node: &Node, w: Vec3, cone: f32, mut each: impl FnMut(&Arrival)) {
+    fn sphere_arrivals(&self, place: usize, w: Vec3, cone: f32, mut each: impl FnMut(&Arrival)) {
+        let node = &self.nodes[place];
         let frame = Basis::from_normal(w);
         // The disc of the sphere's radius has sphere² times the node's area.
         let share = cone / (CONE as f32 * self.sphere * self.sphere);
@@ -169,16 +176,17 @@ impl Gather {
             let w = frame.to_world(direction(height, (k as f32 * 0.618_034).fract()));
             let cos = -node.n.dot(w);
             if cos > 0.0 {
-                each(&Arrival { direction: w, solid_angle: share * cos, radiance: node.radiance(self.kernel, -w) });
+                each(&Arrival { direction: w, solid_angle: share * cos, radiance: self.radiance(place, -w) });
             }
         }
     }
-}
 
-impl Node {
-    /// Radiance in the unit direction `w`.
-    fn radiance(&self, kernel: Kernel, w: Vec3) -> Rgb {
-        self.diffuse + self.lobe.radiance(kernel, w)
+    /// A node's radiance in the unit direction `w`.
+    fn radiance(&self, place: usize, w: Vec3) -> Rgb {
+        let node = &self.nodes[place];
+        let first = node.diffuse + node.lobe.radiance(self.kernel, w);
+        let more = self.more.get(place).into_iter().flatten().take_while(|lobe| lobe.magnitude != Rgb::ZERO);
+        more.fold(first, |sum, lobe| sum + lobe.radiance(self.kernel, w))
     }
 }
 

@@ -1,5 +1,6 @@
 //! How frames are made of many lights.
 
+use super::mixture::MOST_LOBES;
 use crate::Result;
 use crate::base::named::{Parameters, within, words};
 use crate::view::MOST_SUPERSAMPLES;
@@ -72,8 +73,8 @@ pub struct ManyLightParams {
     pub near: f32,
     /// Reflections at lights, the first, of light straight from emitters, included. *Paper*: 1 to 3; 2 in Figure 1.
     pub bounces: u32,
-    /// Whether lights have glossy lobes; without, they are diffuse, as those of other methods are.
-    pub lobes: bool,
+    /// Most glossy lobes a node. *Paper*: 1, mixtures are its future work; with 0 lights are diffuse, as those of other methods are.
+    pub lobes: u32,
     /// Their shape.
     pub kernel: Kernel,
     /// Least Phong exponent of a lobe, before it is filtered. *Paper*: its materials have 5 or more.
@@ -114,7 +115,7 @@ impl Default for ManyLightParams {
             max_cut: 9.0,
             near: 3.0,
             bounces: 2,
-            lobes: true,
+            lobes: 1,
             kernel: Kernel::Phong,
             min_exponent: 1.0,
             max_exponent: 60.0,
@@ -141,6 +142,7 @@ impl Parameters for ManyLightParams {
         within("min_cut", self.min_cut, self.max_cut..=1e6)?;
         within("near", self.near, 0.0..=1e3)?;
         within("bounces", self.bounces, 1..=64)?;
+        within("lobes", self.lobes, 0..=MOST_LOBES as u32)?;
         within("min_exponent", self.min_exponent, 0.0..=1e6)?;
         within("max_exponent", self.max_exponent, self.min_exponent..=1e6)?;
         within("clamp", self.clamp, 1e-6..=1e9)?;

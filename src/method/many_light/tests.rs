@@ -236,7 +236,7 @@ fn glossy_light_alone_goes_from_glossy_to_glossy() {
     let exact = sum(plain(4096));
     let filtered = sum(ManyLightParams { traversal: Traversal::Cuts, ..plain(4096) });
     assert!(exact > 0.02 && (filtered / exact - 1.0).abs() < 0.1, "{filtered}, {exact}");
-    assert_eq!(sum(ManyLightParams { lobes: false, ..plain(4096) }), 0.0);
+    assert_eq!(sum(ManyLightParams { lobes: 0, ..plain(4096) }), 0.0);
     let two = sum(ManyLightParams { bounces: 2, ..plain(4096) });
     assert!(two > 1.3 * exact, "a second bounce between metals: {two}, {exact}");
 }
@@ -267,7 +267,7 @@ fn glossy_sums_tend_to_integration() {
                     let at = Place { triangle: hit.triangle, barycentric: hit.barycentric, back };
                     let site = Site::new(&world, &at, 1.0, &params);
                     let emission = direct(&world, &[site], 16, hash_words(&[i as u32, k]))[0];
-                    radiance += emission.lobes.filtered().radiance(params.kernel, -d).y;
+                    radiance += emission.lobes.filtered()[0].radiance(params.kernel, -d).y;
                 });
             }
             sum += radiance / 400.0;
