@@ -6,16 +6,17 @@
 
 use super::arrival::{Arrival, Received};
 use super::cuts::Forest;
+use super::descend::{Descent, Receiver};
 use super::disc;
 use super::emit::Emission;
 use super::lobe::Lobe;
 use super::mixture::{MOST_LOBES, Mixture};
 use super::params::{Kernel, MOST_SHADOW_RAYS, ManyLightParams};
 use super::tree::Tree;
-use crate::base::math::{Basis, Rgb, hash64, unit};
+use crate::base::math::{Basis, Rgb, hash64, luminance, unit};
 use crate::material::bsdf::warp::direction;
 use glam::Vec3;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Directions within a spherical light's cone.
 const CONE: u32 = 8;
@@ -33,8 +34,8 @@ pub struct Node {
     n: Vec3,
     /// Where a traversal goes on that takes it as a whole.
     skip: u32,
-    /// Squared distance below which a traversal goes on to its children; what solid angles ask for and the max cut forbids is left out.
-    reach: f32,
+    /// Where a traversal goes on to its children.
+    descent: Descent,
     /// Mean diffuse radiance.
     diffuse: Rgb,
     /// Mean glossy radiance; the first lobe of a mixture.
@@ -68,18 +69,21 @@ impl Gather {
                 (left.0 + right.0, lobes)
             };
         }
+        let radiance = |i: usize| {
+            let (diffuse, lobes) = &sums[i];
+            (luminance(*diffuse) + lobes.weight() * FRAC_1_PI) / tree.clusters[i].area.max(f32::MIN_POSITIVE)
+        };
+        let mean = if sums.is_empty() { 0.0 } else { radiance(0) }.max(f32::MIN_POSITIVE);
         let node = |((&i, &skip), &last): ((&u32, &u32), &bool)| {
             let (cluster, (diffuse, lobes)) = (&tree.clusters[i as usize], &sums[i as usize]);
             let area = cluster.area.max(f32::MIN_POSITIVE);
             let [lobe, more @ ..] = lobes.filtered().map(|lobe| Lobe { magnitude: lobe.magnitude / area, ..lobe });
-            let wide = area / params.solid_angle;
-            let reach = if last { wide.min(params.near * params.near * area / PI) } else { wide };
             let node = Node {
                 p: cluster.p,
                 area,
                 n: cluster.n,
                 skip,
-                reach: if cluster.is_leaf() { 0.0 } else { reach },
+                descent: Descent::new(cluster, last, radiance(i as usize) / mean, params),
                 diffuse: *diffuse / area,
                 lobe,
                 lights: [cluster.first, cluster.count],
@@ -96,11 +100,11 @@ impl Gather {
         }
     }
 
-    /// All that arrives at `p`, and how many nodes were visited; `receive` says what becomes of it, `is_seen` whether something stands
+    /// All that arrives at a receiver, and how many nodes were visited; `receive` says what becomes of it, `is_seen` whether something stands
     /// between there and the light of a number in the tree's order. Random numbers, where there are any, are hashes of `stream`.
     pub fn at<R: Received>(
         &self,
-        p: Vec3,
+        receiver: &Receiver,
         receive: impl Fn(&Arrival) -> R,
         is_seen: impl Fn(u32) -> bool,
         stream: u32,
@@ -110,9 +114,9 @@ impl Gather {
         let (mut place, mut visited) = (0, 0);
         while let Some(node) = self.nodes.get(place) {
             visited += 1;
-            let to = node.p - p;
+            let to = node.p - receiver.p;
             let d2 = to.length_squared();
-            if d2 < node.reach {
+            if node.descent.goes_on(receiver, to, node.n, node.area) {
                 place += 1;
                 continue;
             }

@@ -14,6 +14,7 @@ pub mod adaptive;
 pub mod arrival;
 pub mod bounce;
 pub mod cuts;
+pub mod descend;
 pub mod disc;
 pub mod emit;
 pub mod gather;

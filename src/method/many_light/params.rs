@@ -68,9 +68,14 @@ pub struct ManyLightParams {
     pub min_cut: f32,
     /// sigma2: the same of the max cut. *Paper*: 9.
     pub max_cut: f32,
-    /// Distance from a node, in radii of a disc of its area, below which a traversal goes down past the max cut. *Paper*: 0; *Ours*: what is so
-    /// near may reach below the horizon.
+    /// Distance from a node of mean radiance, in radii of a disc of its area, below which a traversal goes down past the max cut; it goes as the
+    /// root of the radiance. *Paper*: 0.
     pub near: f32,
+    /// The same distance of a node that the receiver's horizon cuts, and which would count in full. *Paper*: 0.
+    pub horizon: f32,
+    /// Part of a receiver's glossy lobe beyond which a node in it is taken apart past the max cut, too; 0 for no such rule. *Paper*: 0. *Ours*:
+    /// a node is a point to a lobe, which would be dark between points.
+    pub fill: f32,
     /// Reflections at lights, the first, of light straight from emitters, included. *Paper*: 1 to 3; 2 in Figure 1.
     pub bounces: u32,
     /// Most glossy lobes a node. *Paper*: 1, mixtures are its future work; with 0 lights are diffuse, as those of other methods are.
@@ -113,7 +118,9 @@ impl Default for ManyLightParams {
             traversal: Traversal::Cuts,
             min_cut: 40.0,
             max_cut: 9.0,
-            near: 3.0,
+            near: 1.5,
+            horizon: 3.0,
+            fill: 0.5,
             bounces: 2,
             lobes: 1,
             kernel: Kernel::Phong,
@@ -141,6 +148,8 @@ impl Parameters for ManyLightParams {
         within("max_cut", self.max_cut, 0.0..=1e6)?;
         within("min_cut", self.min_cut, self.max_cut..=1e6)?;
         within("near", self.near, 0.0..=1e3)?;
+        within("horizon", self.horizon, 0.0..=1e3)?;
+        within("fill", self.fill, 0.0..=1e6)?;
         within("bounces", self.bounces, 1..=64)?;
         within("lobes", self.lobes, 0..=MOST_LOBES as u32)?;
         within("min_exponent", self.min_exponent, 0.0..=1e6)?;

@@ -5,6 +5,7 @@
 use super::adaptive::Sampler as Pixels;
 use super::arrival::{Arrival, Received};
 use super::bounce::{Structure, light, sites};
+use super::descend::Receiver;
 use super::emit::{Site, direct};
 use super::gather::Gather;
 use super::params::{ManyLightParams, Sampling, Traversal};
@@ -158,7 +159,7 @@ impl Received for Irradiance {
 
 fn irradiance(gather: &Gather, site: &Site) -> f32 {
     let receive = |a: &Arrival| Irradiance(a.radiance.y * a.solid_angle * a.direction.dot(site.n).max(0.0));
-    gather.at(site.surface.p, receive, |_| true, 0).0.0
+    gather.at(&Receiver { p: site.surface.p, n: site.n, lobe: None }, receive, |_| true, 0).0.0
 }
 
 #[test]
@@ -330,7 +331,12 @@ fn shadow_rays_give_the_sum_of_what_is_seen() {
         }
         let receive = |a: &Arrival| Irradiance(a.radiance.y * a.solid_angle * a.direction.dot(site.n).max(0.0));
         let is_seen = |light: u32| seen(&lit.sites[lit.structure.tree.order[light as usize] as usize]);
-        let once = |s| lit.gather.at(site.surface.p, receive, is_seen, hash_words(&[k as u32, s])).0.0;
+        let once = |s| {
+            lit.gather
+                .at(&Receiver { p: site.surface.p, n: site.n, lobe: None }, receive, is_seen, hash_words(&[k as u32, s]))
+                .0
+                .0
+        };
         found += (0..STREAMS).map(once).sum::<f32>() / STREAMS as f32;
     }
     assert!(expected < 0.97 * unshadowed, "something is hidden: {expected} of {unshadowed}");
