@@ -17,6 +17,7 @@ pub mod cuts;
 pub mod descend;
 pub mod disc;
 pub mod emit;
+pub mod follow;
 pub mod gather;
 pub mod lobe;
 pub mod mixture;

@@ -89,6 +89,13 @@ pub struct ManyLightParams {
     /// Most of a receiver's lobe that a node may fill: its solid angle times the lobe's density towards it. *Ours*: what is cut off of the
     /// singularity at d = 0 that the solid angle of a disc leaves; 1 is what a surface of the same radiance gives that fills the lobe.
     pub clamp: f32,
+    /// Rays in a row that follow the lobes of mirrors and polished surfaces in a view, to where light is gathered; 0 gathers for such lobes as for
+    /// others. *Paper*: 0.
+    pub mirror_rays: u32,
+    /// Alpha up to which they follow a lobe. *Ours*: that of an exponent of 60.
+    pub mirror_alpha: f32,
+    /// How many a pixel are drawn from its lobe, but for perfect mirrors, which have one; 0 for one in the mirror direction, without noise.
+    pub mirror_samples: u32,
     /// Radius of virtual spherical lights (Hasan et al. 2009), in radii of a disc of the node's area; 0 for points. *Paper*: points.
     pub sphere: f32,
     /// Shadow rays a gather, towards nodes drawn by what they send (stochastic lightcuts); 0 leaves out what blocks indirect light. *Paper*: 0.
@@ -127,6 +134,9 @@ impl Default for ManyLightParams {
             min_exponent: 1.0,
             max_exponent: 60.0,
             clamp: 1.0,
+            mirror_rays: 4,
+            mirror_alpha: 0.09,
+            mirror_samples: 0,
             sphere: 0.0,
             shadow_rays: 0,
             light_samples: 16,
@@ -155,6 +165,9 @@ impl Parameters for ManyLightParams {
         within("min_exponent", self.min_exponent, 0.0..=1e6)?;
         within("max_exponent", self.max_exponent, self.min_exponent..=1e6)?;
         within("clamp", self.clamp, 1e-6..=1e9)?;
+        within("mirror_rays", self.mirror_rays, 0..=64)?;
+        within("mirror_alpha", self.mirror_alpha, 0.0..=1.0)?;
+        within("mirror_samples", self.mirror_samples, 0..=1 << 12)?;
         within("sphere", self.sphere, 0.0..=100.0)?;
         within("shadow_rays", self.shadow_rays, 0..=MOST_SHADOW_RAYS as u32)?;
         within("light_samples", self.light_samples, 1..=1 << 16)?;

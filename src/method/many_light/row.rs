@@ -24,7 +24,7 @@ use serde_json::Value as Json;
 /// The row.
 pub const METHOD: Method = Method {
     name: "many-light",
-    about: "Virtual point lights with filtered lobes (Maletz 2009): semi-glossy light without a bake",
+    about: "Virtual point lights with filtered lobes (Maletz 2009), mirrors by rays: glossy light without a bake",
     reads: Reads::NOTHING,
     layers: &["diffuse", "glossy"],
     options: &["supersample", "denoise", "lights", "set"],
@@ -48,6 +48,9 @@ fn parameters(options: &Options) -> Result<Json> {
     let base = ManyLightParams { supersample, denoise: options.denoise.then(DenoiseParams::default), ..base };
     tree(&apply(&base, &options.set)?)
 }
+
+/// Figures of a frame.
+type Counts = Vec<(&'static str, f64)>;
 
 /// What a pixel has, and how many nodes were visited for it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -82,8 +85,8 @@ fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
 }
 
 impl OnCpu<'_> {
-    /// The layers that this method computes, and what came of the sampling.
-    fn layers(&self, shading: &Shading, view: &GBuffer, frame: u32, clock: &mut Clock) -> ([Vec<Rgb>; 2], Filled<Sample>) {
+    /// The layers that this method computes, and what came of it.
+    fn layers(&self, shading: &Shading, view: &GBuffer, frame: u32, clock: &mut Clock) -> ([Vec<Rgb>; 2], Counts) {
         let world = shading.world;
         let (lower, upper) = world.scene.geometry.bounds();
         let sample = |i: usize, p: &_| {
@@ -95,6 +98,9 @@ impl OnCpu<'_> {
         clock.lap("gather");
         let lights: Vec<Light> = filled.values.iter().map(|s| s.light).collect();
         let [mut diffuse, mut glossy] = shading.layers(view, &lights);
+        let (followed, mirrors) = shading.followed(view);
+        glossy.iter_mut().zip(followed).for_each(|(sum, c)| *sum += c);
+        clock.lap("mirrors");
         let (seed, count) = (self.setup.seed, self.params.direct_samples);
         let lambert = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
         let straight = view.shade([seed, frame], |p, stream| direct(world, p, lambert, count, stream));
@@ -105,7 +111,7 @@ impl OnCpu<'_> {
         });
         glossy.iter_mut().zip(straight).for_each(|(sum, c)| *sum += c);
         clock.lap("direct");
-        ([diffuse, glossy], filled)
+        ([diffuse, glossy], counts(&filled, mirrors))
     }
 }
 
@@ -135,7 +141,7 @@ impl Renderer for OnCpu<'_> {
             params: &params,
             seeds: [setup.seed, view.frame],
         };
-        let ([diffuse, glossy], filled) = self.layers(&shading, &g, view.frame, &mut clock);
+        let ([diffuse, glossy], counts) = self.layers(&shading, &g, view.frame, &mut clock);
         let mut layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
         if let Some(of) = &params.denoise {
             let guides = guides(world, &view.camera, of, GUIDE_SAMPLES, setup.seed, view.frame);
@@ -144,12 +150,12 @@ impl Renderer for OnCpu<'_> {
         }
         self.structure = Some(structure);
         progress.advance(view.camera.size[1].into());
-        Ok(Frame { counts: counts(&filled), ..Frame::of(layers, clock.laps) })
+        Ok(Frame { counts, ..Frame::of(layers, clock.laps) })
     }
 }
 
-/// Shading points, and the nodes that were visited a point.
-fn counts(filled: &Filled<Sample>) -> Vec<(&'static str, f64)> {
+/// Shading points, the nodes that were visited a point, and pixels whose lobes rays follow.
+fn counts(filled: &Filled<Sample>, mirrors: usize) -> Counts {
     let visited = || filled.values.iter().zip(&filled.sampled).filter(|(_, sampled)| **sampled).map(|(s, _)| s.visited);
     let points = visited().count();
     let mean = visited().map(f64::from).sum::<f64>() / points.max(1) as f64;
@@ -158,5 +164,6 @@ fn counts(filled: &Filled<Sample>) -> Vec<(&'static str, f64)> {
         ("least nodes", visited().min().unwrap_or(0).into()),
         ("most nodes", visited().max().unwrap_or(0).into()),
         ("mean nodes", mean),
+        ("mirror pixels", mirrors as f64),
     ]
 }

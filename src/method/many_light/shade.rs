@@ -8,6 +8,7 @@ use super::arrival::{Arrival, Received};
 use super::bounce::Structure;
 use super::descend::{Cone, Receiver};
 use super::emit::{Site, exponent};
+use super::follow::is_followed;
 use super::gather::Gather;
 use super::lobe::density;
 use super::params::ManyLightParams;
@@ -63,7 +64,8 @@ impl Shading<'_> {
     /// Indirect light at a pixel, and the nodes that were visited for it.
     pub fn light(&self, i: usize, p: &Pixel) -> (Light, u32) {
         let [seed, frame] = self.seeds;
-        self.gathered(&p.surface, p.wo, p.alpha, hash_words(&[seed, frame, PIXEL, i as u32]))
+        let alpha = p.alpha.filter(|&alpha| !is_followed(alpha, self.params));
+        self.gathered(&p.surface, p.wo, alpha, hash_words(&[seed, frame, PIXEL, i as u32]))
     }
 
     /// The same at a surface that is seen from the unit direction `wo`, of whose glossy lobe the alpha is given, if light is gathered for it.
