@@ -4,6 +4,7 @@
 
 use super::arrival::Received;
 use super::cuts::Forest;
+use super::descend::Receiver;
 use super::emit::{Emission, Site, direct};
 use super::gather::Gather;
 use super::params::ManyLightParams;
@@ -59,7 +60,8 @@ pub fn light(
             let is_seen =
                 |light: u32| !world.occluded(&site.surface.spawn_to(sites[tree.order[light as usize] as usize].surface.p));
             let stream = hash_words(&[seed, BOUNCE, bounce, i as u32]);
-            let (gathered, _): (Emission, u32) = gather.at(site.surface.p, |a| site.receive(a), is_seen, stream);
+            let (gathered, _): (Emission, u32) =
+                gather.at(&Receiver { p: site.surface.p, n: site.n, lobe: None }, |a| site.receive(a), is_seen, stream);
             let mut sum = direct[i];
             sum.add(&gathered, 1.0);
             sum

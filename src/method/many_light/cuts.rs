@@ -4,8 +4,7 @@
 //! wall would be a single node, whatever sigma2 is, where the paper visits 500 to 1000. *Reading*: the variance is that of the metric by which
 //! the tree is built (Eq. 5: positions and normals), in units of 1/25: a traversal then visits about as many as the paper's (docs/results.md).
 //! *Reading*: a node between the cuts is there with all its kin, so that no light is lost where one child has a smaller variance than the other.
-//! *Ours*: a traversal goes down past the max cut where a node is so near that it may reach below the receiver's horizon
-//! ([`ManyLightParams::near`]): as a disc, it would count in full.
+//! *Ours*: a traversal goes down past the max cut where a node would be wrong as a whole ([`super::descend`]).
 
 use super::params::{ManyLightParams, Traversal};
 use super::tree::{Cluster, Tree};
@@ -31,7 +30,12 @@ impl Forest {
         let (valid, last): (Vec<bool>, Vec<bool>) = match params.traversal {
             Traversal::Full => all().map(|c| (true, c.is_leaf())).unzip(),
             Traversal::Leaves => all().map(|c| (c.is_leaf(), true)).unzip(),
-            Traversal::Cuts => between(tree, params.min_cut / UNIT, params.max_cut / UNIT, params.near > 0.0),
+            Traversal::Cuts => between(
+                tree,
+                params.min_cut / UNIT,
+                params.max_cut / UNIT,
+                params.near.max(params.horizon).max(params.fill) > 0.0,
+            ),
         };
         // How many valid nodes come before each: where the next one from there on lies among them.
         let mut before = Vec::with_capacity(valid.len() + 1);
@@ -96,7 +100,15 @@ mod tests {
             for (min_cut, max_cut, near) in
                 [(40.0, 9.0, 0.0), (40.0, 9.0, 3.0), (20.0, 10.0, 0.0), (1e6, 0.0, 0.0), (0.0, 0.0, 0.0)]
             {
-                let params = ManyLightParams { traversal, min_cut, max_cut, near, ..ManyLightParams::default() };
+                let params = ManyLightParams {
+                    traversal,
+                    min_cut,
+                    max_cut,
+                    near,
+                    horizon: near,
+                    fill: near,
+                    ..ManyLightParams::default()
+                };
                 let forest = Forest::new(&tree, &params);
                 for way in 0..4u32 {
                     let down = |node: u32| match way {

@@ -1,4 +1,4 @@
-//! What lights send out: light straight from emitters, shadowed, as diffuse radiance and one lobe (§2.1, §2.4).
+//! What lights send out: light straight from emitters, shadowed, as diffuse radiance and one lobe, or a few (§2.1, §2.4).
 //!
 //! *Paper*: shadow maps of a few point lights, a lobe each, merged by filtering. *Ours*: shadow rays to samples of all emitters, those with area
 //! and the environment too; each sample is a small light whose lobe is filtered with the others, so that a wide light makes a wide lobe.
@@ -6,7 +6,8 @@
 //! narrow lobe then carries the energy that the material reflects.
 
 use super::arrival::{Arrival, Received};
-use super::lobe::{Lobe, LobeSum, exponent_of};
+use super::lobe::{Lobe, exponent_of};
+use super::mixture::Mixture;
 use super::params::ManyLightParams;
 use super::place::Place;
 use super::tree::Spot;
@@ -29,8 +30,8 @@ pub(crate) const VIEWS: u32 = 4;
 pub struct Emission {
     /// l_d: diffuse radiance, the same in all directions.
     pub diffuse: Rgb,
-    /// Glossy lobes, to be filtered.
-    pub lobes: LobeSum,
+    /// Glossy lobes, filtered.
+    pub lobes: Mixture,
 }
 
 impl Received for Emission {
@@ -59,6 +60,8 @@ pub struct Site<'w> {
     area: f32,
     /// Exponent of its lobe; `None` without one.
     exponent: Option<f32>,
+    /// Most lobes that it keeps of what it reflects.
+    lobes: usize,
     clamp: f32,
 }
 
@@ -72,9 +75,10 @@ impl<'w> Site<'w> {
             bsdf.diffuse_out(&surface, Vec3::new(d.x, d.y, d.z * side))
         };
         let reflectance = (0..VIEWS).map(out).sum::<Rgb>() * (FRAC_1_PI / VIEWS as f32);
-        let is_glossy = params.lobes && bsdf.lobes().contains(Lobes::NON_DIFFUSE);
+        let is_glossy = params.lobes > 0 && bsdf.lobes().contains(Lobes::NON_DIFFUSE);
         let exponent = bsdf.alpha(&surface).filter(|_| is_glossy).map(|alpha| exponent(alpha, params));
-        Self { n: surface.frame.n * side, surface, side, bsdf, reflectance, area, exponent, clamp: params.clamp }
+        let (lobes, clamp) = (params.lobes as usize, params.clamp);
+        Self { n: surface.frame.n * side, surface, side, bsdf, reflectance, area, exponent, lobes, clamp }
     }
 
     /// Where it is.
@@ -90,10 +94,10 @@ impl<'w> Site<'w> {
             return Emission::default();
         }
         let taken = across * (cos * self.bsdf.diffuse_in(&self.surface, local));
-        let mut emission = Emission { diffuse: taken * self.reflectance, lobes: LobeSum::default() };
+        let mut emission = Emission { diffuse: taken * self.reflectance, lobes: Mixture::default() };
         if let Some(exponent) = self.exponent {
             let magnitude = across * self.bsdf.glossy_albedo(&self.surface, local, GLOSSY);
-            emission.lobes.add(&Lobe { direction: reflect(w, self.n), exponent, magnitude }, 1.0);
+            emission.lobes = Mixture::of(&Lobe { direction: reflect(w, self.n), exponent, magnitude }, 1.0, self.lobes);
         }
         emission
     }

@@ -108,7 +108,7 @@ impl LobeSum {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::base::math::{hash_words, reflect, spread_over_sphere, unit};
     use crate::material::bsdf::microfacet::Microfacets;
@@ -123,7 +123,7 @@ mod tests {
     }
 
     /// A lobe about a direction within `spread` radians of +Z.
-    fn lobe(i: u32, spread: f32, exponent: f32) -> Lobe {
+    pub fn lobe(i: u32, spread: f32, exponent: f32) -> Lobe {
         let [u, v] = [0, 1].map(|k| unit(hash_words(&[i, k])));
         let direction = warp::direction(1.0 - u * (1.0 - spread.cos()), v);
         Lobe { direction, exponent, magnitude: Rgb::ONE }

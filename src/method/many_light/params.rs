@@ -1,5 +1,6 @@
 //! How frames are made of many lights.
 
+use super::mixture::MOST_LOBES;
 use crate::Result;
 use crate::base::named::{Parameters, within, words};
 use crate::view::MOST_SUPERSAMPLES;
@@ -67,13 +68,18 @@ pub struct ManyLightParams {
     pub min_cut: f32,
     /// sigma2: the same of the max cut. *Paper*: 9.
     pub max_cut: f32,
-    /// Distance from a node, in radii of a disc of its area, below which a traversal goes down past the max cut. *Paper*: 0; *Ours*: what is so
-    /// near may reach below the horizon.
+    /// Distance from a node of mean radiance, in radii of a disc of its area, below which a traversal goes down past the max cut; it goes as the
+    /// root of the radiance. *Paper*: 0.
     pub near: f32,
+    /// The same distance of a node that the receiver's horizon cuts, and which would count in full. *Paper*: 0.
+    pub horizon: f32,
+    /// Part of a receiver's glossy lobe beyond which a node in it is taken apart past the max cut, too; 0 for no such rule. *Paper*: 0. *Ours*:
+    /// a node is a point to a lobe, which would be dark between points.
+    pub fill: f32,
     /// Reflections at lights, the first, of light straight from emitters, included. *Paper*: 1 to 3; 2 in Figure 1.
     pub bounces: u32,
-    /// Whether lights have glossy lobes; without, they are diffuse, as those of other methods are.
-    pub lobes: bool,
+    /// Most glossy lobes a node. *Paper*: 1, mixtures are its future work; with 0 lights are diffuse, as those of other methods are.
+    pub lobes: u32,
     /// Their shape.
     pub kernel: Kernel,
     /// Least Phong exponent of a lobe, before it is filtered. *Paper*: its materials have 5 or more.
@@ -83,6 +89,13 @@ pub struct ManyLightParams {
     /// Most of a receiver's lobe that a node may fill: its solid angle times the lobe's density towards it. *Ours*: what is cut off of the
     /// singularity at d = 0 that the solid angle of a disc leaves; 1 is what a surface of the same radiance gives that fills the lobe.
     pub clamp: f32,
+    /// Rays in a row that follow the lobes of mirrors and polished surfaces in a view, to where light is gathered; 0 gathers for such lobes as for
+    /// others. *Paper*: 0.
+    pub mirror_rays: u32,
+    /// Alpha up to which they follow a lobe. *Ours*: that of an exponent of 60.
+    pub mirror_alpha: f32,
+    /// How many a pixel are drawn from its lobe, but for perfect mirrors, which have one; 0 for one in the mirror direction, without noise.
+    pub mirror_samples: u32,
     /// Radius of virtual spherical lights (Hasan et al. 2009), in radii of a disc of the node's area; 0 for points. *Paper*: points.
     pub sphere: f32,
     /// Shadow rays a gather, towards nodes drawn by what they send (stochastic lightcuts); 0 leaves out what blocks indirect light. *Paper*: 0.
@@ -112,13 +125,18 @@ impl Default for ManyLightParams {
             traversal: Traversal::Cuts,
             min_cut: 40.0,
             max_cut: 9.0,
-            near: 3.0,
+            near: 1.5,
+            horizon: 3.0,
+            fill: 0.5,
             bounces: 2,
-            lobes: true,
+            lobes: 1,
             kernel: Kernel::Phong,
             min_exponent: 1.0,
             max_exponent: 60.0,
             clamp: 1.0,
+            mirror_rays: 4,
+            mirror_alpha: 0.09,
+            mirror_samples: 0,
             sphere: 0.0,
             shadow_rays: 0,
             light_samples: 16,
@@ -140,10 +158,16 @@ impl Parameters for ManyLightParams {
         within("max_cut", self.max_cut, 0.0..=1e6)?;
         within("min_cut", self.min_cut, self.max_cut..=1e6)?;
         within("near", self.near, 0.0..=1e3)?;
+        within("horizon", self.horizon, 0.0..=1e3)?;
+        within("fill", self.fill, 0.0..=1e6)?;
         within("bounces", self.bounces, 1..=64)?;
+        within("lobes", self.lobes, 0..=MOST_LOBES as u32)?;
         within("min_exponent", self.min_exponent, 0.0..=1e6)?;
         within("max_exponent", self.max_exponent, self.min_exponent..=1e6)?;
         within("clamp", self.clamp, 1e-6..=1e9)?;
+        within("mirror_rays", self.mirror_rays, 0..=64)?;
+        within("mirror_alpha", self.mirror_alpha, 0.0..=1.0)?;
+        within("mirror_samples", self.mirror_samples, 0..=1 << 12)?;
         within("sphere", self.sphere, 0.0..=100.0)?;
         within("shadow_rays", self.shadow_rays, 0..=MOST_SHADOW_RAYS as u32)?;
         within("light_samples", self.light_samples, 1..=1 << 16)?;

@@ -29,7 +29,7 @@ use std::sync::Arc;
 /// The row.
 pub const METHOD: Method = Method {
     name: "many-light",
-    about: "Virtual point lights with filtered lobes (Maletz 2009): semi-glossy light without a bake",
+    about: "Virtual point lights with filtered lobes (Maletz 2009), mirrors by rays: glossy light without a bake",
     reads: Reads::NOTHING,
     layers: &["diffuse", "glossy"],
     options: &["supersample", "denoise", "lights", "set"],
@@ -74,18 +74,20 @@ struct OnCpu<'a> {
     places: Places,
     /// The tree, where no light moves.
     structure: Option<Structure>,
+    /// Its light, where nothing changes.
+    gather: Option<Gather>,
 }
 
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let params: ManyLightParams = setup.parameters()?;
     let first = setup.animation.map(|animation| setup.world.at(animation, 0));
     let places = place(first.as_ref().unwrap_or(setup.world), params.vpls, params.repulsion, setup.seed);
-    Ok(Box::new(OnCpu { setup: *setup, params, places, structure: None }))
+    Ok(Box::new(OnCpu { setup: *setup, params, places, structure: None, gather: None }))
 }
 
 impl OnCpu<'_> {
-    /// The layers that this method computes, and what came of the sampling.
-    fn layers(&self, shading: &Shading, view: &GBuffer, frame: u32, clock: &mut Clock) -> ([Vec<Rgb>; 2], Filled<Sample>) {
+    /// The layers that this method computes, and what came of it.
+    fn layers(&self, shading: &Shading, view: &GBuffer, frame: u32, clock: &mut Clock) -> ([Vec<Rgb>; 2], Tally) {
         let world = shading.world;
         let (lower, upper) = world.scene.geometry.bounds();
         let sample = |i: usize, p: &_| {
@@ -97,6 +99,9 @@ impl OnCpu<'_> {
         clock.lap("gather");
         let lights: Vec<Light> = filled.values.iter().map(|s| s.light).collect();
         let [mut diffuse, mut glossy] = shading.layers(view, &lights);
+        let (followed, mirrors) = shading.followed(view);
+        glossy.iter_mut().zip(followed).for_each(|(sum, c)| *sum += c);
+        clock.lap("mirrors");
         let (seed, count) = (self.setup.seed, self.params.direct_samples);
         let lambert = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
         let straight = view.shade([seed, frame], |p, stream| direct(world, p, lambert, count, stream));
@@ -107,7 +112,7 @@ impl OnCpu<'_> {
         });
         glossy.iter_mut().zip(straight).for_each(|(sum, c)| *sum += c);
         clock.lap("direct");
-        ([diffuse, glossy], filled)
+        ([diffuse, glossy], counts(&filled, mirrors))
     }
 }
 
@@ -126,7 +131,10 @@ impl Renderer for OnCpu<'_> {
             _ => Structure::new(&sites, &params, setup.seed),
         };
         clock.lap("tree");
-        let gather: Gather = light(world, (&sites, &structure), &params, setup.seed, &mut clock);
+        let gather = match self.gather.take() {
+            Some(kept) if of_frame.is_none() => kept,
+            _ => light(world, (&sites, &structure), &params, setup.seed, &mut clock),
+        };
         let baseline = Baseline::new(world, None, params.supersample);
         let g = baseline.gbuffer(&view.camera, &mut clock);
         let shading = Shading {
@@ -137,12 +145,12 @@ impl Renderer for OnCpu<'_> {
             params: &params,
             seeds: [setup.seed, view.frame],
         };
-        let ([diffuse, glossy], filled) = self.layers(&shading, &g, view.frame, &mut clock);
+        let ([diffuse, glossy], counts) = self.layers(&shading, &g, view.frame, &mut clock);
         let layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
         let layers = finished(layers, world, view, (&params, setup.seed), &mut clock);
-        self.structure = Some(structure);
+        (self.structure, self.gather) = (Some(structure), Some(gather));
         progress.advance(view.camera.size[1].into());
-        Ok(Frame { counts: counts(&filled).listed(), ..Frame::of(layers, clock.laps) })
+        Ok(Frame { counts: counts.listed(), ..Frame::of(layers, clock.laps) })
     }
 }
 
@@ -161,12 +169,12 @@ fn finished(
     layers
 }
 
-/// Shading points, and the nodes that were visited a point.
-fn counts(filled: &Filled<Sample>) -> Tally {
+/// Shading points, the nodes that were visited a point, and pixels whose lobes rays follow.
+fn counts(filled: &Filled<Sample>, mirrors: usize) -> Tally {
     let visited =
         || filled.values.iter().zip(&filled.sampled).filter(|(_, sampled)| **sampled).map(|(s, _)| u64::from(s.visited));
     let ends = [visited().min(), visited().max()].map(Option::unwrap_or_default);
-    Tally { points: visited().count() as u32, nodes: [ends[0], ends[1], visited().sum()] }
+    Tally { points: visited().count() as u32, nodes: [ends[0], ends[1], visited().sum()], mirrors: mirrors as u32 }
 }
 
 impl Tally {
@@ -177,6 +185,7 @@ impl Tally {
             ("least nodes", least),
             ("most nodes", most),
             ("mean nodes", sum / f64::from(self.points.max(1))),
+            ("mirror pixels", self.mirrors.into()),
         ]
     }
 }

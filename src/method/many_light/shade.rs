@@ -6,11 +6,14 @@
 
 use super::arrival::{Arrival, Received};
 use super::bounce::Structure;
+use super::descend::{Cone, Receiver};
 use super::emit::{Site, exponent};
+use super::follow::is_followed;
 use super::gather::Gather;
 use super::lobe::density;
 use super::params::ManyLightParams;
 use crate::base::math::{Rgb, hash_words, luminance, reflect};
+use crate::material::Surface;
 use crate::material::bsdf::Lobes;
 use crate::transport::World;
 use crate::view::gbuffer::{GBuffer, Pixel};
@@ -60,11 +63,19 @@ pub struct Shading<'a> {
 impl Shading<'_> {
     /// Indirect light at a pixel, and the nodes that were visited for it.
     pub fn light(&self, i: usize, p: &Pixel) -> (Light, u32) {
-        let bsdf = &self.world.scene.materials[p.surface.material as usize].bsdf;
-        let side = 1f32.copysign(p.surface.frame.to_local(p.wo).z);
-        let n = p.surface.frame.n * side;
+        let [seed, frame] = self.seeds;
+        let alpha = p.alpha.filter(|&alpha| !is_followed(alpha, self.params));
+        self.gathered(&p.surface, p.wo, alpha, hash_words(&[seed, frame, PIXEL, i as u32]))
+    }
+
+    /// The same at a surface that is seen from the unit direction `wo`, of whose glossy lobe the alpha is given, if light is gathered for it.
+    pub fn gathered(&self, surface: &Surface, wo: Vec3, alpha: Option<f32>, stream: u32) -> (Light, u32) {
+        let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+        let side = 1f32.copysign(surface.frame.to_local(wo).z);
+        let n = surface.frame.n * side;
         let takes_diffuse = bsdf.lobes().contains(Lobes::DIFFUSE);
-        let lobe = p.alpha.map(|alpha| (reflect(p.wo, n), exponent(alpha, self.params)));
+        let lobe = alpha.map(|alpha| (reflect(wo, n), exponent(alpha, self.params)));
+        let cone = lobe.and_then(|(mirrored, exponent)| Cone::new(mirrored, exponent, self.params));
         let receive = |arrival: &Arrival| {
             let Arrival { direction, solid_angle, radiance } = *arrival;
             let cos = direction.dot(n);
@@ -74,7 +85,7 @@ impl Shading<'_> {
             }
             let clamp = self.params.clamp;
             if takes_diffuse {
-                let factor = bsdf.diffuse_in(&p.surface, p.surface.frame.to_local(direction));
+                let factor = bsdf.diffuse_in(surface, surface.frame.to_local(direction));
                 light.irradiance = radiance * (factor * (cos * solid_angle).min(clamp * PI));
             }
             if let Some((mirrored, exponent)) = lobe {
@@ -85,17 +96,16 @@ impl Shading<'_> {
         };
         let is_seen = |light: u32| {
             let site = &self.sites[self.structure.tree.order[light as usize] as usize];
-            !self.world.occluded(&p.surface.spawn_to(site.surface.p))
+            !self.world.occluded(&surface.spawn_to(site.surface.p))
         };
-        let [seed, frame] = self.seeds;
-        self.gather.at(p.surface.p, receive, is_seen, hash_words(&[seed, frame, PIXEL, i as u32]))
+        self.gather.at(&Receiver { p: surface.p, n, lobe: cone }, receive, is_seen, stream)
     }
 
     /// The diffuse and glossy layers of indirect light.
     pub fn layers(&self, view: &GBuffer, lights: &[Light]) -> [Vec<Rgb>; 2] {
         let of = |diffuse: bool| {
             let pixel = |(pixel, light): (&Option<Pixel>, &Light)| match pixel {
-                Some(p) if diffuse => light.irradiance * self.diffuse_out(p),
+                Some(p) if diffuse => light.irradiance * self.diffuse_out(&p.surface, p.wo),
                 Some(p) if p.alpha.is_some() => light.glossy * glossy_albedo(self.world, &p.surface, p.wo),
                 _ => Rgb::ZERO,
             };
@@ -104,8 +114,9 @@ impl Shading<'_> {
         [of(true), of(false)]
     }
 
-    fn diffuse_out(&self, p: &Pixel) -> Vec3 {
-        let bsdf = &self.world.scene.materials[p.surface.material as usize].bsdf;
-        bsdf.diffuse_out(&p.surface, p.surface.frame.to_local(p.wo)) * FRAC_1_PI
+    /// What a surface sends to `wo` of what enters its diffuse lobe.
+    pub fn diffuse_out(&self, surface: &Surface, wo: Vec3) -> Rgb {
+        let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+        bsdf.diffuse_out(surface, surface.frame.to_local(wo)) * FRAC_1_PI
     }
 }

@@ -86,8 +86,7 @@ pub(super) const SITE: StructLayout = layout!(GpuSite as "Site" { p, number, tri
 const CLUSTER: StructLayout = layout!(GpuCluster as "Cluster" { children, area });
 const ORIGIN: StructLayout = layout!(Origin as "Origin" { cluster, is_last });
 const EMISSION: StructLayout = layout!(GpuEmission as "Emission" { diffuse, count, directions, exponents, magnitudes, weight });
-pub(super) const NODE: StructLayout =
-    layout!(GpuNode as "Node" { p, reach, n, area, diffuse, skip, direction, exponent, magnitude, horizon, in_lobe, first, count });
+pub(super) const NODE: StructLayout = layout!(GpuNode as "Node" { p, reach, n, area, diffuse, skip, direction, exponent, magnitude, horizon, in_lobe, first, count });
 
 /// Light straight from emitters that lights send on.
 pub(crate) const SAMPLE_LIGHTS: KernelSpec = KernelSpec {
@@ -291,15 +290,7 @@ impl GpuSite {
 impl From<&Node> for GpuNode {
     fn from(node: &Node) -> Self {
         let [first, count] = node.lights;
-        Self {
-            p: node.p.to_array(),
-            n: node.n.to_array(),
-            area: node.area,
-            skip: node.skip,
-            first,
-            count,
-            ..Self::zeroed()
-        }
+        Self { p: node.p.to_array(), n: node.n.to_array(), area: node.area, skip: node.skip, first, count, ..Self::zeroed() }
     }
 }
 

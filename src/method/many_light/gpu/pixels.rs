@@ -99,14 +99,7 @@ pub(crate) const FOLLOW_LOBES: KernelSpec = KernelSpec {
     twin: "src/method/many_light/follow.rs: followed",
     workgroup: [64, 1],
     scene: true,
-    bindings: &[
-        ("params", Uniform),
-        ("disc", Uniform),
-        ("sites", Read),
-        ("nodes", Read),
-        ("view", Read),
-        ("glossy", ReadWrite),
-    ],
+    bindings: &[("params", Uniform), ("disc", Uniform), ("sites", Read), ("nodes", Read), ("view", Read), ("glossy", ReadWrite)],
     structs: &[&PARAMS, &CAMERA, &SITE, &NODE, &PIXEL, &REFLECTED],
 };
 /// Points and nodes.
