@@ -32,7 +32,6 @@ struct Params {
     fill: f32,
     mirror_alpha: f32,
     mirror_rays: u32,
-    mirror_samples: u32,
     direct_samples: u32,
     // Distance of a grid's pixels, and how many grids are coarser.
     step: u32,

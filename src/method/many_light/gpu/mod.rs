@@ -52,7 +52,6 @@ struct Params {
     fill: f32,
     mirror_alpha: f32,
     mirror_rays: u32,
-    mirror_samples: u32,
     direct_samples: u32,
     step: u32,
     level: u32,
@@ -60,11 +59,11 @@ struct Params {
     lambda: f32,
     threshold: f32,
     diagonal: f32,
-    padding: [u32; 3],
+    padding: [u32; 4],
 }
 pub(crate) const PARAMS: StructLayout = layout!(Params as "Params" {
     camera, seed, frame, first, count, lights, nodes, samples, bounce, sphere, clamp, min_exponent, max_exponent, lobes, clusters,
-    area, solid_angle, near, horizon, fill, mirror_alpha, mirror_rays, mirror_samples, direct_samples, step, level, bilateral, lambda, threshold,
+    area, solid_angle, near, horizon, fill, mirror_alpha, mirror_rays, direct_samples, step, level, bilateral, lambda, threshold,
     diagonal
 });
 
@@ -87,7 +86,6 @@ impl Params {
             fill: params.fill,
             mirror_alpha: params.mirror_alpha,
             mirror_rays: params.mirror_rays,
-            mirror_samples: params.mirror_samples,
             direct_samples: params.direct_samples,
             lambda: params.lambda,
             ..Self::zeroed()
@@ -206,9 +204,7 @@ impl ManyLightOnGpu {
             let base = Params { nodes: lights.nodes(), ..Params::new(camera, seeds, params) };
             pixels.light(gpu, commands, (&base, params), (lights, target))?;
             pixels.layers(gpu, commands, camera, target, (params.direct_samples, seeds))?;
-            if params.mirror_rays > 0 {
-                pixels.follow(gpu, commands, &base, (lights, target))?;
-            }
+            pixels.follow(gpu, commands, &base, (lights, target))?;
             direct.run(&scene, (commands, "direct"), (camera, &target.view), params.direct_samples, seeds)
         })?;
         Ok((frame, pixels.tally(gpu)?))

@@ -118,7 +118,9 @@ pub(super) struct GpuPixels {
     expose: Kernel,
     light: Kernel,
     layers: Kernel,
-    follow: Kernel,
+    /// Where rays follow lobes.
+    follow: Option<Kernel>,
+    mirror_samples: u32,
     tally: Kernel,
     grids: wgpu::Buffer,
     parts: wgpu::Buffer,
@@ -130,13 +132,16 @@ pub(super) struct GpuPixels {
 impl GpuPixels {
     pub(super) fn new(scene: &GpuScene, world: &World, params: &ManyLightParams) -> Result<Self> {
         let gpu = &scene.gpu;
+        let [kernel, shadows] = constants(params);
+        let of_rays = [kernel, shadows, ("MIRROR_SAMPLES", params.mirror_samples.into())];
         let (lower, upper) = world.scene.geometry.bounds();
         Ok(Self {
             choose: Kernel::in_scene(scene, &CHOOSE_PIXELS, &[])?,
             expose: Kernel::new(gpu, &EXPOSE)?,
             light: Kernel::in_scene(scene, &LIGHT_PIXELS, &constants(params))?,
             layers: Kernel::in_scene(scene, &VIEW_LAYERS, &[])?,
-            follow: Kernel::in_scene(scene, &FOLLOW_LOBES, &constants(params))?,
+            follow: (params.mirror_rays > 0).then(|| Kernel::in_scene(scene, &FOLLOW_LOBES, &of_rays)).transpose()?,
+            mirror_samples: params.mirror_samples,
             tally: Kernel::new(gpu, &TALLY)?,
             grids: gpu.output("grids of pixels", size_of::<Grids>() as u64)?,
             parts: gpu.output("counts", LANES * size_of::<Part>() as u64)?,
@@ -149,7 +154,9 @@ impl GpuPixels {
         self.choose.rebind(scene);
         self.light.rebind(scene);
         self.layers.rebind(scene);
-        self.follow.rebind(scene);
+        if let Some(follow) = &mut self.follow {
+            follow.rebind(scene);
+        }
     }
 
     /// Indirect light of all pixels.
@@ -222,12 +229,13 @@ impl GpuPixels {
         base: &Params,
         (lights, target): (&GpuLights, &Target),
     ) -> Result<()> {
-        let rays = base.mirror_rays * base.mirror_samples.max(1);
+        let Some(follow) = &self.follow else { return Ok(()) };
+        let rays = base.mirror_rays * self.mirror_samples.max(1);
         for (first, count) in runs(area(target.view.size) as u32, GATHER_PATHS.saturating_mul(rays)) {
             let params = gpu.uniform("parameters of lobes", &Params { first, count, ..*base })?;
             let [disc, sites, nodes] = lights.gathered();
             let buffers = [&params, disc, sites, nodes, &target.view.pixels, &target.glossy];
-            commands.run("mirrors", &self.follow, &buffers, [count, 1]);
+            commands.run("mirrors", follow, &buffers, [count, 1]);
         }
         Ok(())
     }
