@@ -23,6 +23,7 @@ use crate::scene::{Animation, Scene};
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::View;
+use crate::view::denoiser::Kind;
 use crate::view::layers::LayerImages;
 use crate::{Error, Result};
 use diffuse::{DiffuseConstructor, Joined};
@@ -172,8 +173,8 @@ pub struct Options {
     pub layers: Option<LayerChoice>,
     /// `--rfilter`.
     pub rfilter: Option<FilterChoice>,
-    /// `--denoise`.
-    pub denoise: bool,
+    /// `--denoise`, and by what; `Some(None)` leaves that open.
+    pub denoise: Option<Option<Kind>>,
     /// `--trace`.
     pub trace: Option<String>,
     /// `--paper`.

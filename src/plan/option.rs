@@ -126,6 +126,29 @@ where
     }
 }
 
+/// Its value may be left out.
+impl<T: Text> OptionValue for Option<Option<T>>
+where
+    T::Err: std::fmt::Display,
+{
+    fn write(&self, option: &str, to: &mut Vec<OsString>) {
+        match self {
+            None => {}
+            Some(None) => to.push(option.into()),
+            Some(value) => value.write(option, to),
+        }
+    }
+
+    fn set(&mut self, option: &str, value: Option<&str>) -> Result<()> {
+        let mut inner = None;
+        if value.is_some() {
+            OptionValue::set(&mut inner, option, value)?;
+        }
+        *self = Some(inner);
+        Ok(())
+    }
+}
+
 /// May be given again and again.
 impl OptionValue for Vec<String> {
     fn write(&self, option: &str, to: &mut Vec<OsString>) {
@@ -193,7 +216,8 @@ mod tests {
             "--output" output: PathBuf, /// Samples.
             "--spp" spp: Option<u32>, /// A choice.
             "--paper" paper: bool, /// Parameters.
-            "--set" set: Vec<String> }
+            "--set" set: Vec<String>, /// A value or none.
+            "--by" by: Option<Option<u32>> }
     }
 
     #[test]
@@ -206,6 +230,10 @@ mod tests {
         }
         let words: Vec<String> = e.arguments().into_iter().map(|a| a.into_string().unwrap()).collect();
         assert_eq!(words.join(" "), "s.xml --output out --spp 16 --paper --set a=1 --set b=2");
+        for (value, words) in [(None, &["--by"][..]), (Some("7"), &["--by", "7"])] {
+            e.set("--by", value).unwrap();
+            assert!(e.arguments().iter().rev().zip(words.iter().rev()).all(|(a, b)| a == b), "{:?}", e.arguments());
+        }
     }
 
     #[test]
@@ -215,7 +243,8 @@ mod tests {
             ("--spp", Some("many"), "--spp=many: invalid digit"),
             ("--spp", None, "--spp: expected a value"),
             ("--paper", Some("1"), "--paper=1: expected no value"),
-            ("--magic", None, "example: no option --magic; there are --output, --spp, --paper, --set"),
+            ("--by", Some("x"), "--by=x: invalid digit"),
+            ("--magic", None, "example: no option --magic; there are --output, --spp, --paper, --set, --by"),
         ] {
             let message = e.set(option, value).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");

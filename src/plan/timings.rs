@@ -16,6 +16,9 @@ pub struct Timings {
     pub device: Option<String>,
     /// Whose clock the passes on the GPU were timed by: "gpu", or "cpu" for the host's, which includes handing them over.
     pub clock: String,
+    /// What the noise was taken out by; `None` for nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoiser: Option<String>,
     /// Scene loading, milliseconds.
     pub load_ms: f64,
     /// Acceleration structures, milliseconds.

@@ -2,7 +2,7 @@
 //!
 //! *Sources*: Dammertz et al. 2010 (five levels of a 5 x 5 B3 spline with holes, weights from normal, depth and albedo); the
 //! colour's own edge stop is that of Schied et al. 2017, relative to the noise that the pixel's neighbourhood shows, since no earlier frame
-//! is asked. *Paper* (§7.3.1): its path tracer is denoised by OptiX's network, which we have not.
+//! is asked. *Paper* (§7.3.1): its path tracer is denoised by OptiX's network; [`crate::view::oidn`] is its like.
 //! *Ours*: each layer is divided by its albedo before, and multiplied after, so that textures stay out of the filter; glossy light on surfaces that
 //! are nearly mirrors is guided by what the mirror shows, as if it were seen directly; a pixel far brighter than all
 //! around it is a sample of a rare path, and cut to its neighbours.
@@ -111,10 +111,11 @@ impl Guide {
     }
 }
 
-/// Guides of the diffuse and of the glossy layer of frame number `frame`: means over the camera rays of its first samples.
-pub fn guides(world: &World, camera: &Camera, params: &DenoiseParams, spp: u32, seed: u32, frame: u32) -> [Vec<Guide>; 2] {
+/// Guides of the diffuse and of the glossy layer of frame number `frame`: means over the camera rays of its first samples. Up to
+/// `mirror_alpha`, glossy surfaces are guided by what they show as mirrors.
+pub fn guides(world: &World, camera: &Camera, mirror_alpha: f32, samples: u32, seed: u32, frame: u32) -> [Vec<Guide>; 2] {
     let [width, height] = camera.size;
-    let samples = spp.clamp(1, GUIDE_SAMPLES);
+    let samples = samples.clamp(1, GUIDE_SAMPLES);
     let pixel = |i: u32| {
         let corner = Vec2::new((i % width) as f32, (i / width) as f32);
         let mut sums = [Guide::default(); 2];
@@ -122,7 +123,7 @@ pub fn guides(world: &World, camera: &Camera, params: &DenoiseParams, spp: u32, 
             let [dx, dy, lens_x, lens_y] = Sampler::new(hash_words(&[seed, frame, i]), index).next_4d();
             let ray = camera.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y));
             let far = Guide { depth: FAR, ..Guide::default() };
-            let both = world.seen(&ray).map_or([far; 2], |s| surface_guides(world, &s, -ray.d, params));
+            let both = world.seen(&ray).map_or([far; 2], |s| surface_guides(world, &s, -ray.d, mirror_alpha));
             sums = [sums[0].plus(both[0]), sums[1].plus(both[1])];
         }
         sums.map(|g| g.scaled(1.0 / samples as f32))
@@ -132,14 +133,14 @@ pub fn guides(world: &World, camera: &Camera, params: &DenoiseParams, spp: u32, 
     [diffuse, glossy]
 }
 
-fn surface_guides(world: &World, s: &Surface, wo: Vec3, params: &DenoiseParams) -> [Guide; 2] {
+fn surface_guides(world: &World, s: &Surface, wo: Vec3, mirror_alpha: f32) -> [Guide; 2] {
     let bsdf = &world.scene.materials[s.material as usize].bsdf;
     let wi = s.frame.to_local(wo);
     let (normal, depth) = (facing_normal(s, wo), s.t);
     let diffuse = bsdf.diffuse_albedo(s, wi);
     let lobe = bsdf.glossy_albedo(s, wi, GLOSSY);
     let plain = |albedo: Rgb| Guide { normal, depth, albedo, factor: albedo };
-    let is_mirror = bsdf.lobes().contains(Lobes::NON_DIFFUSE) && bsdf.alpha(s).is_some_and(|a| a <= params.mirror_alpha);
+    let is_mirror = bsdf.lobes().contains(Lobes::NON_DIFFUSE) && bsdf.alpha(s).is_some_and(|a| a <= mirror_alpha);
     if !is_mirror || bsdf.is_transmissive() {
         return [plain(diffuse), plain(lobe)];
     }

@@ -1,14 +1,16 @@
-//! What every method that renders views shares: G-buffer, mirror rays and their light, layers, auxiliary layers.
+//! What every method that renders views shares: G-buffer, mirror rays and their light, layers, auxiliary layers, denoisers.
 
 pub mod aov;
 pub mod baseline;
 pub mod composite;
 pub mod denoise;
+pub mod denoiser;
 pub mod direct;
 pub mod gbuffer;
 pub mod layers;
 pub mod mirror;
 pub mod mirror_light;
+pub mod oidn;
 
 use crate::scene::Camera;
 

@@ -33,7 +33,7 @@ fn check(gpu: &Arc<Gpu>, world: &World, camera: &Camera, params: &DenoiseParams,
     let (spp, seed, frame) = (3, 4, 2);
     let scene = Arc::new(GpuScene::new(gpu.clone(), world).unwrap());
     let denoiser = Denoiser::new(scene, params).unwrap();
-    let cpu = guides(world, camera, params, spp, seed, frame);
+    let cpu = guides(world, camera, params.mirror_alpha, spp, seed, frame);
     let found = denoiser.read(&denoiser.guides(camera, spp, seed, frame).unwrap()).unwrap();
     for (name, a, b) in [("diffuse", &found[0], &cpu[0]), ("glossy", &found[1], &cpu[1])] {
         assert!(apart(a, b) <= most_apart, "{name}: {} of the guides differ", apart(a, b));

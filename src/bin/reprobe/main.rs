@@ -28,6 +28,8 @@ use reprobe::base::clock::seconds;
 use reprobe::gpu::Choice;
 use reprobe::plan::timings::peak_memory;
 use reprobe::plan::{Context, Outcome, Stage};
+use reprobe::view::denoiser::Kind;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// Bakes glossy global illumination into light probes and reprojects it into new views.
@@ -97,8 +99,21 @@ fn main() -> ExitCode {
 
 /// What was typed; usage errors end the process.
 fn parse() -> Cli {
-    let matches = common::hide_idle(Cli::command()).get_matches();
+    let matches = common::hide_idle(Cli::command()).get_matches_from(joined(std::env::args_os()));
     Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())
+}
+
+/// Words with `--denoise` and what may follow it as one: it stands alone too, and then the next word is not its value, but the scene, say.
+fn joined(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut list: Vec<OsString> = Vec::new();
+    for word in words {
+        let is_value = word.to_str().is_some_and(|w| w.parse::<Kind>().is_ok());
+        match list.last_mut().filter(|last| is_value && *last == "--denoise") {
+            Some(last) => last.push(format!("={}", word.display())),
+            None => list.push(word),
+        }
+    }
+    list
 }
 
 /// Keeps Vulkan's loader from software adapters where the choice is ours, as they are only taken by name: starting one costs time, and
@@ -194,6 +209,27 @@ mod tests {
             assert_eq!(shows("--device"), runs_on_gpu, "{name}");
             assert_eq!(shows("--unit-scale"), !["qhmap", "compare", "devices"].contains(&&*name), "{name}");
         }
+    }
+
+    #[test]
+    fn denoise_stands_alone_or_with_a_denoiser() {
+        for (words, expected) in [
+            ("--denoise scene.xml -o out", Some(None)),
+            ("scene.xml -o out --denoise", Some(None)),
+            ("scene.xml -o out --denoise oidn", Some(Some(Kind::Oidn))),
+            ("--denoise filter scene.xml -o out", Some(Some(Kind::Filter))),
+            ("scene.xml --denoise=filter -o out", Some(Some(Kind::Filter))),
+            ("scene.xml -o out", None),
+        ] {
+            let words = ["reprobe", "render-path"].into_iter().chain(words.split(' ')).map(OsString::from);
+            let matches = common::hide_idle(Cli::command()).try_get_matches_from(joined(words)).unwrap();
+            let Command::RenderPath(args) = Cli::from_arg_matches(&matches).unwrap().command else { panic!("another command") };
+            let stage = args.stage();
+            assert_eq!((stage.denoise, stage.scene.to_str()), (expected, Some("scene.xml")));
+        }
+        let words = ["reprobe", "render-path", "scene.xml", "-o", "out", "--denoise=magic"].map(OsString::from);
+        let refused = common::hide_idle(Cli::command()).try_get_matches_from(joined(words.into_iter())).err().unwrap();
+        assert!(refused.to_string().contains("expected one of oidn, filter"), "{refused}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use reprobe::method::{FilterChoice, LayerChoice, METHODS};
 use reprobe::plan::option::Size;
 use reprobe::plan::stages::{Aov, RenderPath};
 use reprobe::plan::views::FrameList;
+use reprobe::view::denoiser::Kind;
 use std::path::PathBuf;
 
 /// Render the frames of a camera path
@@ -15,6 +16,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   reprobe render-path room/scene.xml --path room/path.json --probes probes/ --lightmap lightmap.exr --curvature curvature.exr -o frames/
   reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 256 -o reference/
+  reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 4 --denoise oidn -o denoised/
   reprobe render-path room/scene.xml --path room/path.json --method lightmap-rt --lightmap lightmap.exr --match-time frames/ -o rays/
   reprobe render-path room/scene.xml --lights lights.json --method path-trace --spp 64 -o evening/
   reprobe render-path room/scene.xml --lights lights.json --method many-light --set bounces=3 -o preview/
@@ -76,8 +78,9 @@ pub struct Args {
     #[arg(long, value_name = "FILTER", help = used_by("rfilter", "box, or scene: the filter of the scene's film, for the image that Mitsuba \
         would make of it; frames of other methods and references are box-filtered, and only like can be compared with like [default: box]"))]
     rfilter: Option<FilterChoice>,
-    #[arg(long, help = used_by("denoise", "filter the layers, guided by albedo, normal and depth"))]
-    denoise: bool,
+    #[arg(long, value_name = "DENOISER", require_equals = true, help = used_by("denoise", "take the noise out of the layers: oidn, Intel's Open Image \
+        Denoise (pip install pyoidn, or OIDN_DIR=folder); filter, our own [default: oidn where it is found, else filter]"))]
+    denoise: Option<Option<Kind>>,
     #[arg(long, value_name = "MS", conflicts_with_all = ["spp", "samples"],
         help = used_by("budget-ms", "choose the samples with which a frame takes about so long, milliseconds"))]
     budget_ms: Option<f64>,

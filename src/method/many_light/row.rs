@@ -8,7 +8,6 @@ use super::gpu::{ManyLightOnGpu, Tally};
 use super::params::ManyLightParams;
 use super::points::{Places, place};
 use super::shade::{Light, Shading};
-use crate::Result;
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{apply, tree};
@@ -20,9 +19,11 @@ use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
 use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, denoise, guides};
+use crate::view::denoiser::Kind;
 use crate::view::direct::{GLOSSY_BRANCH, direct};
 use crate::view::gbuffer::{GBuffer, GLOSSY};
 use crate::view::layers::LayerImages;
+use crate::{Error, Result};
 use serde_json::Value as Json;
 use std::sync::Arc;
 
@@ -45,9 +46,14 @@ pub const METHOD: Method = Method {
 };
 
 fn parameters(options: &Options) -> Result<Json> {
+    if options.denoise == Some(Some(Kind::Oidn)) {
+        return Err(Error::Request(
+            "--denoise oidn: path-trace has it; many-light has the filter alone: --denoise filter".into(),
+        ));
+    }
     let base = ManyLightParams::default();
     let supersample = options.supersample.unwrap_or(base.supersample);
-    let base = ManyLightParams { supersample, denoise: options.denoise.then(DenoiseParams::default), ..base };
+    let base = ManyLightParams { supersample, denoise: options.denoise.map(|_| DenoiseParams::default()), ..base };
     tree(&apply(&base, &options.set)?)
 }
 
@@ -163,7 +169,7 @@ fn finished(
     clock: &mut Clock,
 ) -> LayerImages {
     let Some(of) = &params.denoise else { return layers };
-    let guides = guides(world, &view.camera, of, GUIDE_SAMPLES, seed, view.frame);
+    let guides = guides(world, &view.camera, of.mirror_alpha, GUIDE_SAMPLES, seed, view.frame);
     let layers = denoise(&layers, &guides, view.camera.size[0] as usize, of);
     clock.lap("denoise");
     layers

@@ -177,14 +177,14 @@ impl Denoiser {
     }
 
     /// The guides of a frame, as [`crate::view::denoise::guides`] has them; a dispatch for each of a pixel's rays.
-    pub fn guides(&self, camera: &Camera, spp: u32, seed: u32, frame: u32) -> Result<GpuGuides> {
+    pub fn guides(&self, camera: &Camera, samples: u32, seed: u32, frame: u32) -> Result<GpuGuides> {
         let gpu = &self.scene.gpu;
         let bytes = area(camera.size) * size_of::<GpuGuide>() as u64;
         let guides = GpuGuides {
             size: camera.size,
             layers: [gpu.output("the diffuse layer's guides", bytes)?, gpu.output("the glossy layer's guides", bytes)?],
         };
-        let count = spp.clamp(1, GUIDE_SAMPLES);
+        let count = samples.clamp(1, GUIDE_SAMPLES);
         for index in 0..count {
             let mirror_alpha = self.params.mirror_alpha;
             let params = GuideParams { camera: camera.into(), seed, frame, index, count, mirror_alpha, padding: [0; 3] };

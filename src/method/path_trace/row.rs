@@ -1,10 +1,10 @@
 //! Path tracing in the table of methods.
 
-use super::denoise_gpu::Denoiser;
+use super::denoise_gpu::Denoiser as OnDevice;
 use super::gpu::PathTracer;
 use super::{PathTraceParams, path_trace, path_trace_full};
 use crate::base::clock::Clock;
-use crate::base::named::{Parameters, apply, tree, within};
+use crate::base::named::{Parameters, tree, within};
 use crate::base::progress::Progress;
 use crate::gpu::{Gpu, GpuScene};
 use crate::method::{FilterChoice, ForScene, Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
@@ -12,7 +12,8 @@ use crate::scene::Scene;
 use crate::scene::film::Filter;
 use crate::transport::path::PathParams;
 use crate::view::View;
-use crate::view::denoise::{DenoiseParams, denoise, guides};
+use crate::view::denoise::{DenoiseParams, guides};
+use crate::view::denoiser::Denoiser;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -48,22 +49,22 @@ struct Params {
     /// Reconstruction filter, until the scene is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rfilter: Option<FilterChoice>,
-    /// Of the filter; `None` for none.
+    /// `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    denoise: Option<DenoiseParams>,
+    denoise: Option<Denoiser>,
 }
 
 fn parameters(options: &Options) -> Result<Value> {
-    if !options.denoise && !options.set.is_empty() {
+    if options.denoise.is_none() && !options.set.is_empty() {
         return Err(Error::Request("--set: of path-trace, the denoiser alone has parameters; give --denoise too".into()));
     }
-    if options.denoise && options.layers == Some(LayerChoice::Full) {
-        return Err(Error::Request("--denoise filters layer by layer: leave --layers full out".into()));
+    if options.denoise.is_some() && options.layers == Some(LayerChoice::Full) {
+        return Err(Error::Request("--denoise works layer by layer: leave --layers full out".into()));
     }
     let base = PathTraceParams::default();
     let path_trace = PathTraceParams { spp: options.spp.unwrap_or(base.spp), ..base };
     path_trace.validate()?;
-    let denoise = options.denoise.then(|| apply(&DenoiseParams::default(), &options.set)).transpose()?;
+    let denoise = options.denoise.map(|wanted| Denoiser::choose(wanted, &options.set)).transpose()?;
     let Options { layers, max_depth, rfilter, .. } = *options;
     tree(&Params { path_trace, layers: layers.unwrap_or_default(), max_depth, rfilter, denoise })
 }
@@ -135,9 +136,9 @@ impl Renderer for OnCpu<'_> {
         let mut layers = path_trace(world, camera, &params, seed, *frame, progress);
         clock.lap("path_trace");
         if let Some(d) = &self.params.denoise {
-            let guides = guides(world, camera, d, spp, seed, *frame);
+            let guides = guides(world, camera, d.mirror_alpha(), d.guide_samples(spp), seed, *frame);
             clock.lap("guides");
-            layers = denoise(&layers, &guides, camera.size[0] as usize, d);
+            layers = d.denoise(&layers, &guides, camera.size[0] as usize)?;
             clock.lap("denoise");
         }
         Ok(Frame::of(layers, clock.laps))
@@ -147,7 +148,7 @@ impl Renderer for OnCpu<'_> {
 struct OnGpu<'a> {
     setup: Setup<'a>,
     tracer: PathTracer,
-    denoiser: Option<Denoiser>,
+    denoiser: Option<(Denoiser, OnDevice)>,
     layers: LayerChoice,
 }
 
@@ -158,7 +159,15 @@ fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
         return Err(Error::Request("the GPU's path tracer has a box filter alone; use --device cpu".into()));
     }
     let scene = Arc::new(GpuScene::new(gpu, setup.world)?);
-    let denoiser = denoise.map(|d| Denoiser::new(scene.clone(), &d)).transpose()?;
+    let on_device = |d: Denoiser| {
+        let params = match d {
+            Denoiser::Filter(params) => params,
+            // Of the network, the device has the guides alone.
+            Denoiser::Oidn { params, .. } => DenoiseParams { mirror_alpha: params.mirror_alpha, ..DenoiseParams::default() },
+        };
+        Ok::<_, Error>((d, OnDevice::new(scene.clone(), &params)?))
+    };
+    let denoiser = denoise.map(on_device).transpose()?;
     let tracer = PathTracer::new(scene, &path_trace.path, layers == LayerChoice::All)?;
     let mut frames = OnGpu { setup: *setup, tracer, denoiser, layers };
     // What the GPU lacks shows in any frame.
@@ -173,7 +182,7 @@ impl OnGpu<'_> {
     fn relight(&mut self, view: &View) -> Result<bool> {
         let Some(world) = self.setup.world_at(view) else { return Ok(false) };
         let scene = self.tracer.relight(&world)?;
-        if let Some(denoiser) = &mut self.denoiser {
+        if let Some((_, denoiser)) = &mut self.denoiser {
             denoiser.rebind(scene);
         }
         Ok(true)
@@ -200,10 +209,13 @@ impl Renderer for OnGpu<'_> {
         }
         let mut layers = self.tracer.layers(camera, spp, seed, *frame, progress)?;
         clock.lap("path_trace");
-        if let Some(d) = &self.denoiser {
-            let guides = d.guides(camera, spp, seed, *frame)?;
+        if let Some((d, device)) = &self.denoiser {
+            let guides = device.guides(camera, d.guide_samples(spp), seed, *frame)?;
             clock.lap("guides");
-            layers = d.denoise(&layers, &guides)?;
+            layers = match d {
+                Denoiser::Filter(_) => device.denoise(&layers, &guides)?,
+                Denoiser::Oidn { .. } => d.denoise(&layers, &device.read(&guides)?, camera.size[0] as usize)?,
+            };
             clock.lap("denoise");
         }
         Ok(Frame::of(layers, clock.laps))

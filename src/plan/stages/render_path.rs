@@ -23,6 +23,8 @@ use crate::scene::{Animation, Camera};
 use crate::surface::{CurvatureMap, curvature_file};
 use crate::transport::World;
 use crate::view::View;
+use crate::view::denoiser::{Denoiser, Kind};
+use crate::view::oidn::Oidn;
 use crate::{Error, Result};
 use serde::de::IgnoredAny;
 use serde_json::{Value, json};
@@ -76,8 +78,8 @@ stage! {
         "--layers" layers: Option<LayerChoice>,
         /// Reconstruction filter of path-traced frames.
         "--rfilter" rfilter: Option<FilterChoice>,
-        /// Filter path-traced layers.
-        "--denoise" denoise: bool,
+        /// Take the noise out of the layers, and by what.
+        "--denoise" denoise: Option<Option<Kind>>,
         /// Choose the samples with which a frame takes so many milliseconds.
         "--budget-ms" budget_ms: Option<f64>,
         /// Choose those with which it takes as long as the frames of this folder.
@@ -105,7 +107,7 @@ pub enum Aov {
 words!(Aov { All "all" });
 words!(LayerChoice { All "all", Full "full" });
 words!(FilterChoice { Box "box", Scene "scene" });
-crate::plan::option::text!(Aov, LayerChoice, FilterChoice);
+crate::plan::option::text!(Aov, LayerChoice, FilterChoice, Kind);
 
 /// Options that make sense together: what is computed.
 pub struct Resolved {
@@ -149,7 +151,7 @@ impl RenderPath {
             ("max-depth", self.max_depth.is_some()),
             ("layers", self.layers.is_some()),
             ("rfilter", self.rfilter.is_some()),
-            ("denoise", self.denoise),
+            ("denoise", self.denoise.is_some()),
             ("budget-ms", self.budget_ms.is_some()),
             ("match-time", self.match_time.is_some()),
             ("gpu-memory", self.gpu_memory.is_some()),
@@ -255,6 +257,10 @@ impl RenderPath {
         refuse_parallel(method, &views)?;
         let (parameters, warnings) = (method.for_scene)(parameters, &world.scene)?;
         warnings.iter().for_each(|w| cx.listener.warn(w));
+        if let Some(denoiser) = Denoiser::among(&parameters) {
+            timings.denoiser = Some(denoiser.to_string());
+            cx.listener.detail(&in_words(denoiser, self.denoise.flatten()));
+        }
         let budget = Budget::read(self.budget_ms, self.match_time.as_deref(), cx)?;
         let setup = Setup {
             world: &world,
@@ -316,6 +322,15 @@ impl RenderPath {
             cx.listener.warn("no --lightmap: the diffuse layer is black");
         }
         Ok(Inputs { animation, lightmap, curvature, provenance, world })
+    }
+}
+
+/// Which denoiser frames have, and where it lies or why it is not another.
+fn in_words(denoiser: Denoiser, wanted: Option<Kind>) -> String {
+    match (denoiser, Oidn::found()) {
+        (Denoiser::Oidn { .. }, Ok(oidn)) => format!("denoised by {denoiser}: {}", oidn.path.display()),
+        (Denoiser::Filter(_), Err(why)) if wanted.is_none() => format!("denoised by {denoiser}: {why}"),
+        _ => format!("denoised by {denoiser}"),
     }
 }
 
@@ -460,7 +475,8 @@ mod tests {
             ("path-trace", &["levels=100", "despeckle=25", "normal_power=-1"]),
         ] {
             for set in sets {
-                let stage = RenderPath { denoise: method == "path-trace", set: vec![(*set).into()], ..of(method) };
+                let stage =
+                    RenderPath { denoise: (method == "path-trace").then_some(None), set: vec![(*set).into()], ..of(method) };
                 let message = stage.check().err().unwrap_or_else(|| panic!("{method} takes {set}")).to_string();
                 assert!(message.contains("expected") || message.contains("--set"), "{message}");
             }
