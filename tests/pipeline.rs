@@ -272,7 +272,7 @@ fn every_baseline_writes_the_layers_and_keeps_its_frames() {
     for (method, inputs) in [
         ("ulr", "--probes out/probes --lightmap out/lightmap.exr --supersample 2"),
         ("image-space-gather", "--lightmap out/lightmap.exr --samples 20"),
-        ("lightmap-rt", "--lightmap out/lightmap.exr --samples 2 --max-depth 2"),
+        ("lightmap-rt", "--lightmap out/lightmap.exr --samples 2 --max-depth 2 --denoise"),
         ("path-trace", "--spp 2 --denoise"),
     ] {
         let command = format!("render-path scene.xml --path path.json --size 32x18 --method {method} -o {method} {inputs}");
@@ -327,7 +327,10 @@ fn a_budget_chooses_a_sample_count_that_gives_the_same_frames_again() {
     assert!(f.refusal(&ulr).contains("--budget-ms: --method ulr has no use for it"));
     assert!(f.refusal(&path_trace("-o d --denoise --layers full")).contains("--layers full"));
     assert!(f.refusal(&command("--probes out/probes -o d --budget-ms 200")).contains("--method glossy-probes has no use"));
-    assert!(f.refusal(&command("--method ulr --probes out/probes -o d --denoise")).contains("path-trace, many-light has"));
+    assert!(
+        f.refusal(&command("--method ulr --probes out/probes -o d --denoise"))
+            .contains("path-trace, lightmap-rt, many-light has")
+    );
     assert!(f.refusal(&command("--method ulr --probes out/probes -o d --set supersample=0")).contains("1 to 8"));
 }
 

@@ -168,7 +168,8 @@ pub fn denoise(layers: &LayerImages, guides: &[Vec<Guide>; 2], width: usize, par
 /// One layer's light, albedo divided out, and the variance of its luminance.
 type Signal = Vec<(Rgb, f32)>;
 
-fn filter_layer(layer: &[Rgb], guides: &[Guide], width: usize, params: &DenoiseParams) -> Vec<Rgb> {
+/// One layer, filtered.
+pub fn filter_layer(layer: &[Rgb], guides: &[Guide], width: usize, params: &DenoiseParams) -> Vec<Rgb> {
     let image = Image { guides, slopes: slopes(guides, width), width, height: layer.len() / width.max(1), params };
     let factor = |g: &Guide| g.factor.max(Rgb::splat(MIN_ALBEDO));
     let light: Vec<Rgb> = layer.iter().zip(guides).map(|(&c, g)| c / factor(g)).collect();

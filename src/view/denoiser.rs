@@ -3,6 +3,7 @@
 //! The choice is made before anything is rendered and stands in the frames' provenance, so that frames of one are never taken for those of
 //! the other.
 
+use crate::base::math::Rgb;
 use crate::base::named::{apply, words};
 use crate::view::denoise::{self, DenoiseParams, GUIDE_SAMPLES, Guide};
 use crate::view::layers::LayerImages;
@@ -75,12 +76,21 @@ impl Denoiser {
         }
     }
 
-    /// The layers without their noise, on the CPU.
-    pub fn denoise(&self, layers: &LayerImages, guides: &[Vec<Guide>; 2], width: usize) -> Result<LayerImages> {
+    /// One layer without its noise, on the CPU.
+    pub fn denoise_layer(&self, layer: &[Rgb], guides: &[Guide], width: usize) -> Result<Vec<Rgb>> {
         match self {
-            Self::Filter(params) => Ok(denoise::denoise(layers, guides, width, params)),
-            Self::Oidn { params, .. } => oidn::denoise(layers, guides, width, params),
+            Self::Filter(params) => Ok(denoise::filter_layer(layer, guides, width, params)),
+            Self::Oidn { .. } => oidn::denoise_layer(layer, guides, width),
         }
+    }
+
+    /// The diffuse and the glossy layer without their noise, on the CPU; emission has none.
+    pub fn denoise(&self, layers: &LayerImages, guides: &[Vec<Guide>; 2], width: usize) -> Result<LayerImages> {
+        Ok(LayerImages {
+            emission: layers.emission.clone(),
+            diffuse: self.denoise_layer(&layers.diffuse, &guides[0], width)?,
+            glossy: self.denoise_layer(&layers.glossy, &guides[1], width)?,
+        })
     }
 }
 

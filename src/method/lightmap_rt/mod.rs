@@ -20,6 +20,7 @@ use crate::material::Surface;
 use crate::transport::path::{PathParams, scattered};
 use crate::transport::{Sampler, World};
 use crate::view::MOST_SUPERSAMPLES;
+use crate::view::denoiser::Denoiser;
 use crate::view::gbuffer::{GBuffer, GLOSSY, Pixel, glossy};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -29,7 +30,7 @@ use serde::{Deserialize, Serialize};
 const MOST_BOUNCES: u32 = 1 << 12;
 
 /// Rays of a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightmapRtParams {
     /// N x N rays a pixel through the G-buffer.
@@ -41,11 +42,14 @@ pub struct LightmapRtParams {
     /// Sample emitters at each vertex, and combine both by multiple importance sampling. The last hit then scatters once more, towards
     /// emitters alone. *Paper*: no.
     pub next_event: bool,
+    /// Takes the noise out of the glossy layer; `None` for nothing. *Paper*: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoise: Option<Denoiser>,
 }
 
 impl Default for LightmapRtParams {
     fn default() -> Self {
-        Self { supersample: 1, samples: 4, bounces: 3, next_event: false }
+        Self { supersample: 1, samples: 4, bounces: 3, next_event: false, denoise: None }
     }
 }
 

@@ -12,6 +12,9 @@ use crate::method::{Frame, Method, Need, Options, Reads, Renderer, Samples, Setu
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
+use crate::view::denoise::{GUIDE_SAMPLES, guides};
+use crate::view::denoiser::Denoiser;
+use crate::view::layers::LayerImages;
 use serde_json::Value;
 use std::sync::Arc;
 
@@ -21,7 +24,7 @@ pub const METHOD: Method = Method {
     about: "Baseline: light map, and rays along the glossy lobes",
     reads: Reads { probes: None, lightmap: Need::Required, curvature: Need::No },
     layers: &["glossy"],
-    options: &["lightmap", "supersample", "samples", "max-depth", "budget-ms", "match-time", "set"],
+    options: &["lightmap", "supersample", "samples", "max-depth", "denoise", "budget-ms", "match-time", "set"],
     samples: Some(Samples { option: "samples", pointer: "/samples" }),
     transmissive: false,
     orthographic: false,
@@ -41,7 +44,8 @@ fn parameters(options: &Options) -> Result<Value> {
         bounces: options.max_depth.unwrap_or(base.bounces),
         ..base
     };
-    tree(&apply(&base, &options.set)?)
+    let denoise = options.denoise.map(|wanted| Denoiser::choose(wanted, &[])).transpose()?;
+    tree(&LightmapRtParams { denoise, ..apply(&base, &options.set)? })
 }
 
 struct OnCpu<'a> {
@@ -67,26 +71,50 @@ impl Renderer for OnCpu<'_> {
         let glossy = lightmap_rt(self.world, self.lightmap, &g, &params, self.seed, view.frame);
         clock.lap("rays");
         let layers = self.baseline.layers(&g, &glossy, &mut clock);
+        let layers = finished(layers, self.world, view, (self.params.denoise, self.seed), &mut clock)?;
         progress.advance(view.camera.size[1].into());
         Ok(Frame::of(layers, clock.laps))
     }
 }
 
-struct OnGpu {
+/// Layers after the last pass, on the CPU whichever device has made them: the glossy one, the only one that rays make noisy, denoised where
+/// that is asked for.
+fn finished(
+    layers: LayerImages,
+    world: &World,
+    view: &View,
+    (denoise, seed): (Option<Denoiser>, u32),
+    clock: &mut Clock,
+) -> Result<LayerImages> {
+    let Some(denoiser) = denoise else { return Ok(layers) };
+    let [_, guides] = guides(world, &view.camera, denoiser.mirror_alpha(), GUIDE_SAMPLES, seed, view.frame);
+    clock.lap("guides");
+    let glossy = denoiser.denoise_layer(&layers.glossy, &guides, view.camera.size[0] as usize)?;
+    clock.lap("denoise");
+    Ok(LayerImages { glossy, ..layers })
+}
+
+struct OnGpu<'a> {
     rays: LightmapRt,
+    world: &'a World,
+    denoise: Option<Denoiser>,
     seed: u32,
 }
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let rays = LightmapRt::new(gpu, setup.world, setup.required_lightmap()?, &setup.parameters()?)?;
-    Ok(Box::new(OnGpu { rays, seed: setup.seed }))
+    let params: LightmapRtParams = setup.parameters()?;
+    let rays = LightmapRt::new(gpu, setup.world, setup.required_lightmap()?, &params)?;
+    Ok(Box::new(OnGpu { rays, world: setup.world, denoise: params.denoise, seed: setup.seed }))
 }
 
-impl Renderer for OnGpu {
+impl Renderer for OnGpu<'_> {
     fn frame(&mut self, view: &View, _: Option<&View>, samples: u32, progress: &dyn Progress) -> Result<Frame> {
         let frame = self.rays.frame(&view.camera, samples, self.seed, view.frame)?;
+        let mut clock = Clock::start();
+        clock.laps = frame.passes;
+        let layers = finished(frame.layers, self.world, view, (self.denoise, self.seed), &mut clock)?;
         progress.advance(view.camera.size[1].into());
-        Ok(Frame::of(frame.layers, frame.passes))
+        Ok(Frame::of(layers, clock.laps))
     }
 
     /// Its passes are as long as their pace says, so that the host times them.

@@ -48,7 +48,7 @@ pub const METHOD: Method = Method {
 fn parameters(options: &Options) -> Result<Json> {
     if options.denoise == Some(Some(Kind::Oidn)) {
         return Err(Error::Request(
-            "--denoise oidn: path-trace has it; many-light has the filter alone: --denoise filter".into(),
+            "--denoise oidn: path-trace and lightmap-rt have it; many-light has the filter alone: --denoise filter".into(),
         ));
     }
     let base = ManyLightParams::default();

@@ -2,10 +2,10 @@
 //!
 //! *Paper* (§7.3.1): its path tracer is denoised by OptiX's network, of which this is the like for a CPU. The library's output does not depend on
 //! the number of threads, but on its version, and in the last bits on the instructions that the processor has.
-//! *Ours*: the network runs on each layer, with the guides of [`crate::view::denoise::guides`], so that it sees through mirrors. Its own training knows what to
-//! do with albedo: dividing the layers by it first, as the filter does, was farther from the reference (docs/results.md).
+//! *Ours*: the network runs on each layer, with the guides of [`crate::view::denoise::guides`], so that it sees through mirrors, and their
+//! noise is taken out first. Dividing the layers by their albedo, as the filter does, was farther from the reference (docs/results.md).
 //!
-//! In: layers and their guides, linear. Out: layers.
+//! In: a layer and its guides, linear. Out: the layer.
 
 mod library;
 mod places;
@@ -16,7 +16,6 @@ use crate::Result;
 use crate::base::math::Rgb;
 use crate::base::named::{Parameters, within};
 use crate::view::denoise::{GUIDE_SAMPLES, Guide};
-use crate::view::layers::LayerImages;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -24,8 +23,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OidnParams {
-    /// Take the noise out of albedo and normals first, and tell the network so.
-    pub clean_guides: bool,
     /// Camera rays that a pixel's guides are the mean of.
     pub guide_samples: u32,
     /// Greatest alpha at which the glossy layer is guided by what the mirror shows.
@@ -34,7 +31,7 @@ pub struct OidnParams {
 
 impl Default for OidnParams {
     fn default() -> Self {
-        Self { clean_guides: true, guide_samples: GUIDE_SAMPLES, mirror_alpha: 0.02 }
+        Self { guide_samples: GUIDE_SAMPLES, mirror_alpha: 0.02 }
     }
 }
 
@@ -45,25 +42,19 @@ impl Parameters for OidnParams {
     }
 }
 
-/// Denoises the diffuse and the glossy layer; emission is without noise.
-pub fn denoise(layers: &LayerImages, guides: &[Vec<Guide>; 2], width: usize, params: &OidnParams) -> Result<LayerImages> {
+/// A layer of images `width` pixels wide, without its noise.
+///
+/// # Errors
+/// The library is not there, or fails.
+pub fn denoise_layer(layer: &[Rgb], guides: &[Guide], width: usize) -> Result<Vec<Rgb>> {
     let oidn = Oidn::found()?;
-    Ok(LayerImages {
-        emission: layers.emission.clone(),
-        diffuse: denoise_layer(oidn, &layers.diffuse, &guides[0], width, params)?,
-        glossy: denoise_layer(oidn, &layers.glossy, &guides[1], width, params)?,
-    })
-}
-
-fn denoise_layer(oidn: &Oidn, layer: &[Rgb], guides: &[Guide], width: usize, params: &OidnParams) -> Result<Vec<Rgb>> {
-    let mut albedo: Vec<Vec3> = guides.iter().map(|g| g.albedo.clamp(Rgb::ZERO, Rgb::ONE)).collect();
-    let mut normal: Vec<Vec3> = guides.iter().map(|g| g.normal).collect();
-    if params.clean_guides {
-        albedo = oidn.filtered(&[(c"albedo", &albedo)], &[], width)?;
-        normal = oidn.filtered(&[(c"normal", &normal)], &[], width)?;
-    }
+    let albedo: Vec<Vec3> = guides.iter().map(|g| g.albedo.clamp(Rgb::ZERO, Rgb::ONE)).collect();
+    let normal: Vec<Vec3> = guides.iter().map(|g| g.normal).collect();
+    // The few rays of the guides leave noise in them, which goes first.
+    let albedo = oidn.filtered(&[(c"albedo", &albedo)], &[], width)?;
+    let normal = oidn.filtered(&[(c"normal", &normal)], &[], width)?;
     let images: [(_, &[Vec3]); 3] = [(c"color", layer), (c"albedo", &albedo), (c"normal", &normal)];
-    let clean = oidn.filtered(&images, &[(c"hdr", true), (c"cleanAux", params.clean_guides)], width)?;
+    let clean = oidn.filtered(&images, &[(c"hdr", true), (c"cleanAux", true)], width)?;
     // Where no ray of the guides met a surface that has the layer, there is none to denoise.
     let pixel = |((&noisy, clean), g): ((&Rgb, Rgb), &Guide)| if g.factor == Rgb::ZERO { noisy } else { clean };
     Ok(layer.iter().zip(clean).zip(guides).map(pixel).collect())
