@@ -144,7 +144,7 @@ fn rmse<'a>(a: impl Iterator<Item = (&'a Rgb, &'a Rgb)>) -> f32 {
 fn edges(image: &[Rgb], width: usize) -> Vec<bool> {
     let far = |a: Rgb, b: Rgb| (a - b).abs().max_element() > 0.3;
     let at = |i: usize| {
-        let right = (i + 1) % width != 0 && far(image[i], image[i + 1]);
+        let right = !(i + 1).is_multiple_of(width) && far(image[i], image[i + 1]);
         right || image.get(i + width).is_some_and(|&below| far(image[i], below))
     };
     (0..image.len()).map(at).collect()
