@@ -59,7 +59,6 @@ struct Params {
     lambda: f32,
     threshold: f32,
     diagonal: f32,
-    padding: [u32; 4],
 }
 pub(crate) const PARAMS: StructLayout = layout!(Params as "Params" {
     camera, seed, frame, first, count, lights, nodes, samples, bounce, sphere, clamp, min_exponent, max_exponent, lobes, clusters,
