@@ -22,8 +22,7 @@ fn direct_starts(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let pixel = params.first_pixel + id.x;
-    let width = params.camera.width;
-    let wo = -camera_ray(params.camera, vec2(f32(pixel % width), f32(pixel / width)) + 0.5, vec2(0.5)).direction;
+    let wo = towards_camera(params.camera, pixel);
     let seen = view[pixel];
     var is_lit = seen.material != NOT_GLOSSY;
     if params.what == DIFFUSE_LIGHT {
@@ -35,6 +34,6 @@ fn direct_starts(@builtin(global_invocation_id) id: vec3<u32>) {
         shading[pixel].diffuse = albedo;
         is_lit = any(albedo != vec3(0.0));
     }
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), params.frame), pixel));
+    let stream = hash3(params.seed, params.frame, pixel);
     starts[id.x] = PathStart(select(NO_TRIANGLE, seen.triangle, is_lit), seen.u, seen.v, stream, wo, 0u, params.all_samples);
 }

@@ -27,10 +27,9 @@ fn lobe_rays(@builtin(global_invocation_id) id: vec3<u32>) {
         rays[id.x].lives = 0u;
         return;
     }
-    let width = params.camera.width;
-    let wo = -camera_ray(params.camera, vec2(f32(pixel % width), f32(pixel / width)) + 0.5, vec2(0.5)).direction;
+    let wo = towards_camera(params.camera, pixel);
     let s = surface_at(hit_of(seen.triangle, seen.u, seen.v));
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), params.frame), pixel));
+    let stream = hash3(params.seed, params.frame, pixel);
     var draws = branch(sampler_new(stream, params.first_sample + id.x / params.pixels), LOBE_BRANCH);
     let v = next_4d(&draws);
     let wi = to_local(s.frame, wo);

@@ -16,10 +16,9 @@ fn view_starts(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let pixel = params.first_pixel + id.x;
-    let width = params.camera.width;
-    let ray = camera_ray(params.camera, vec2(f32(pixel % width), f32(pixel / width)) + 0.5, vec2(0.5));
+    let wo = towards_camera(params.camera, pixel);
     let triangle = select(view[pixel].triangle, NO_TRIANGLE, view[pixel].material == NOT_GLOSSY);
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), params.frame), pixel));
-    starts[id.x] = PathStart(triangle, view[pixel].u, view[pixel].v, stream, -ray.direction, 0u, params.samples);
+    let stream = hash3(params.seed, params.frame, pixel);
+    starts[id.x] = PathStart(triangle, view[pixel].u, view[pixel].v, stream, wo, 0u, params.samples);
 }
 

@@ -21,7 +21,7 @@ fn added(a: Emission, b: Emission, scale: f32) -> Emission {
 }
 
 fn weight_of(emission: Emission) -> f32 {
-    return luminance(emission.diffuse) + emission.weight * FRAC_1_PI;
+    return emission_weight(emission);
 }
 
 // A light that fills the hemisphere has an irradiance of pi.

@@ -18,7 +18,7 @@ struct Origin {
 
 // A cluster's radiance, about.
 fn radiance(sum: Emission, area: f32) -> f32 {
-    return (luminance(sum.diffuse) + sum.weight * FRAC_1_PI) / max(area, MIN_POSITIVE);
+    return emission_weight(sum) / max(area, MIN_POSITIVE);
 }
 
 @compute @workgroup_size(64)

@@ -3,9 +3,9 @@
 
 // #include "many_light/receive.wgsl"
 // #include "shared/camera_ray.wgsl"
+// #include "shared/direct_at.wgsl"
 // #include "shared/factors.wgsl"
 // #include "shared/mirror.wgsl"
-// #include "shared/path.wgsl"
 // #include "shared/view.wgsl"
 
 // Marks random numbers of rays along lobes.
@@ -18,16 +18,6 @@ override MIRROR_SAMPLES: u32 = 0u;
 
 @group(0) @binding(4) var<storage, read> view: array<Pixel>;
 @group(0) @binding(5) var<storage, read_write> glossy: array<vec4<f32>>;
-
-// The mean of so many samples of light straight from emitters. Twin: view::direct::direct_at.
-fn direct_at(hit: Hit, wo: vec3<f32>, count: u32, stream: u32) -> vec3<f32> {
-    var sum = vec3(0.0);
-    for (var k = 0u; k < count; k++) {
-        var s = sampler_new(stream, k);
-        sum += integrate(Start(hit, wo, Query(ALL_LOBES, 1.0), 0.0, true), PathParams(1u, NONE), &s);
-    }
-    return sum / f32(max(count, 1u));
-}
 
 // What a ray brings back that leaves a surface by its lobe, and those that follow it from mirror to mirror. Every function has one call, as
 // functions are put in where they are called.
@@ -49,7 +39,7 @@ fn along(first: Hit, seen_from: vec3<f32>, straight: u32, stream: u32) -> vec3<f
             var sent = light.irradiance * bsdf_diffuse_out(surface, wi) * FRAC_1_PI;
             sent += select(vec3(0.0), light.glossy * albedo, alpha >= 0.0 && !goes_on);
             let of_direct = hash_end(hash_next(hash_next(hash_start(), branch), STRAIGHT));
-            sum += throughput * (sent + direct_at(hit, wo, straight, of_direct));
+            sum += throughput * (sent + direct_at(hit, wo, Query(ALL_LOBES, 1.0), straight, of_direct));
             if !goes_on {
                 break;
             }
@@ -87,10 +77,9 @@ fn follow_lobes(@builtin(global_invocation_id) id: vec3<u32>) {
     if pixel.material == NOT_GLOSSY || !is_followed(pixel.alpha) {
         return;
     }
-    let width = params.camera.width;
-    let wo = -camera_ray(params.camera, vec2(f32(i % width), f32(i / width)) + 0.5, vec2(0.5)).direction;
+    let wo = towards_camera(params.camera, i);
     let marks = hash_end(hash_next(hash_next(hash_start(), params.seed), RAY));
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), marks), params.frame), i));
+    let stream = hash3(marks, params.frame, i);
     // All rays of a perfect mirror are the same.
     let count = select(max(MIRROR_SAMPLES, 1u), 1u, pixel.alpha == 0.0);
     let straight = (params.direct_samples + count - 1u) / count;

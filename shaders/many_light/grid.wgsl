@@ -33,5 +33,5 @@ fn is_surface(i: u32) -> bool {
 
 // How much light a pixel has.
 fn weight_at(i: u32) -> f32 {
-    return luminance(lit[i].irradiance) * FRAC_1_PI + luminance(lit[i].glossy);
+    return light_weight(lit[i].irradiance, lit[i].glossy);
 }

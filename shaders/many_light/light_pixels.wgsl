@@ -22,8 +22,7 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = lit[place].listed - 1u;
     lit[place].listed = 0u;
     let pixel = view[i];
-    let width = params.camera.width;
-    let wo = -camera_ray(params.camera, vec2(f32(i % width), f32(i / width)) + 0.5, vec2(0.5)).direction;
+    let wo = towards_camera(params.camera, i);
     let is_gathered = pixel.material != NOT_GLOSSY && !is_followed(pixel.alpha);
     let marks = hash_next(hash_next(hash_next(hash_start(), params.seed), params.frame), PIXEL);
     let surface = surface_at(hit_of(pixel.triangle, pixel.u, pixel.v));

@@ -1,5 +1,7 @@
 // Light of a view's pixels. Twin: method::many_light::row::Sample.
 
+// #include "shared/math.wgsl"
+
 struct LitPixel {
     // Of the diffuse lobe without its albedo.
     irradiance: vec3<f32>,
@@ -9,4 +11,9 @@ struct LitPixel {
     glossy: vec3<f32>,
     // The list of pixels to be lit, an entry a pixel: which, plus 1; 0 past its end.
     listed: u32,
+}
+
+// How much light that is. Twin: method::many_light::shade::Light::weight.
+fn light_weight(irradiance: vec3<f32>, glossy: vec3<f32>) -> f32 {
+    return luminance(irradiance) * FRAC_1_PI + luminance(glossy);
 }

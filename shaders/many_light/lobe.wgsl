@@ -29,6 +29,11 @@ fn dark() -> Emission {
     return Emission(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
 }
 
+// How much it is. Twin: method::many_light::emit::Emission::weight.
+fn emission_weight(emission: Emission) -> f32 {
+    return luminance(emission.diffuse) + emission.weight * FRAC_1_PI;
+}
+
 // Density of a normalised lobe at the cosine from its centre, per steradian.
 fn density(exponent: f32, cosine: f32) -> f32 {
     if GAUSSIAN {

@@ -45,3 +45,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
+
+// Whether rays follow a lobe of this alpha.
+fn is_followed(alpha: f32) -> bool {
+    return params.mirror_rays > 0u && alpha <= params.mirror_alpha;
+}

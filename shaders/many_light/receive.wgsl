@@ -2,6 +2,7 @@
 
 // #include "many_light/exponent.wgsl"
 // #include "many_light/gather.wgsl"
+// #include "many_light/lit_pixel.wgsl"
 // #include "shared/bsdf.wgsl"
 
 // Part of a lobe's greatest density that ends it.
@@ -28,7 +29,7 @@ fn added(a: Received, b: Received, scale: f32) -> Received {
 }
 
 fn weight_of(light: Received) -> f32 {
-    return luminance(light.irradiance) * FRAC_1_PI + luminance(light.glossy);
+    return light_weight(light.irradiance, light.glossy);
 }
 
 fn receive(arrival: Arrival) -> Received {
@@ -46,11 +47,6 @@ fn receive(arrival: Arrival) -> Received {
         light.glossy = arrival.radiance * min(arrival.solid_angle * lobe, params.clamp);
     }
     return light;
-}
-
-// Whether rays follow a lobe of this alpha. Twin: method::many_light::follow::is_followed.
-fn is_followed(alpha: f32) -> bool {
-    return params.mirror_rays > 0u && alpha <= params.mirror_alpha;
 }
 
 // Light at a surface that is seen from the unit direction `wo`; the alpha of its glossy lobe is negative where nothing is gathered for one.

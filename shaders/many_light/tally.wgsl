@@ -32,7 +32,7 @@ fn tally(@builtin(local_invocation_index) lane: u32) {
             part.most = max(part.most, visited);
             part.sum += visited;
         }
-        if params.mirror_rays > 0u && view[i].material != NOT_GLOSSY && view[i].alpha <= params.mirror_alpha {
+        if view[i].material != NOT_GLOSSY && is_followed(view[i].alpha) {
             part.mirrors++;
         }
     }

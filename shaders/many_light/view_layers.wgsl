@@ -24,8 +24,7 @@ fn view_layers(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let hit = hit_of(pixel.triangle, pixel.u, pixel.v);
     let s = surface_at(hit);
-    let width = params.camera.width;
-    let wo = -camera_ray(params.camera, vec2(f32(i % width), f32(i / width)) + 0.5, vec2(0.5)).direction;
+    let wo = towards_camera(params.camera, i);
     shading[i].diffuse = lit[i].irradiance * bsdf_diffuse_out(s, to_local(s.frame, wo)) * FRAC_1_PI;
     if pixel.material != NOT_GLOSSY {
         glossy[i] = vec4(lit[i].glossy * shading[i].albedo + glossy_direct(hit, wo, i), 0.0);

@@ -81,7 +81,7 @@ fn add_guides(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let i = id.y * camera.width + id.x;
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), guide_params.seed), guide_params.frame), i));
+    let stream = hash3(guide_params.seed, guide_params.frame, i);
     var s = sampler_new(stream, guide_params.index);
     let p = next_4d(&s);
     var ray = camera_ray(camera, vec2<f32>(id.xy) + p.xy, p.zw);

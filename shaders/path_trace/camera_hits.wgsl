@@ -30,7 +30,7 @@ fn camera_hits(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = params.first_pixel + i % params.pixels;
     let index = params.first_sample + i / params.pixels;
     let width = params.camera.width;
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), params.frame), pixel));
+    let stream = hash3(params.seed, params.frame, pixel);
     var s = sampler_new(stream, index);
     let p = next_4d(&s);
     let ray = camera_ray(params.camera, vec2(f32(pixel % width), f32(pixel / width)) + p.xy, p.zw);

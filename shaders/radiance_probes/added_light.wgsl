@@ -19,8 +19,7 @@ fn added_light(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let s = surface_at(hit_of(view[pixel].triangle, view[pixel].u, view[pixel].v));
-    let width = params.camera.width;
-    let wo = -camera_ray(params.camera, vec2(f32(pixel % width), f32(pixel / width)) + 0.5, vec2(0.5)).direction;
+    let wo = towards_camera(params.camera, pixel);
     var light = bsdf_diffuse_out(s, to_local(s.frame, wo));
     if any(light != vec3(0.0)) {
         light *= irradiance_of(taps_of(s, wo)) * FRAC_1_PI;

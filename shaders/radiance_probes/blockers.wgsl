@@ -42,7 +42,7 @@ fn blockers(@builtin(global_invocation_id) id: vec3<u32>) {
     let surface = surface_at(hit);
     let wi = to_local(surface.frame, end.wo);
     let side = select(1.0, -1.0, wi.z < 0.0);
-    var s = sampler_new(hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), i), BLOCKER)), 0u);
+    var s = sampler_new(hash3(params.seed, i, BLOCKER), 0u);
     let start = Start(hit, vec3(side, 0.0, 0.0), Query(ALL_LOBES, 1.0), side, true);
     list[i].sent = bsdf_diffuse_out(surface, wi) * FRAC_1_PI;
     list[i].direct = integrate(start, PathParams(1u, NONE), &s);

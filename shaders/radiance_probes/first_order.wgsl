@@ -60,8 +60,7 @@ fn first_order(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let hit = hit_of(view[pixel].triangle, view[pixel].u, view[pixel].v);
     let s = surface_at(hit);
-    let width = params.camera.width;
-    let wo = -camera_ray(params.camera, vec2(f32(pixel % width), f32(pixel / width)) + 0.5, vec2(0.5)).direction;
+    let wo = towards_camera(params.camera, pixel);
     let back = dot(s.frame.n, wo) < 0.0;
     var light: array<vec3<f32>, 4>;
     for (var k = 0u; k < 4u; k++) {

@@ -28,7 +28,7 @@ fn receiver_light(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let first = RECEIVER_WORDS * (params.first + id.x);
     let back = receivers[first] / BACK_BIT;
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), receivers[first] % BACK_BIT), back));
+    let stream = hash3(params.seed, receivers[first] % BACK_BIT, back);
     let side = 1.0 - 2.0 * f32(back);
     var sum = vec3(0.0);
     for (var k = 0u; k < params.samples; k++) {

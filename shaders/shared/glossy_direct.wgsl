@@ -1,7 +1,7 @@
 // Light straight from emitters that a pixel's glossy lobes send to the camera. Twin: src/view/direct.rs.
 
 // #include "shared/camera_ray.wgsl"
-// #include "shared/path.wgsl"
+// #include "shared/direct_at.wgsl"
 // #include "shared/pixel_run.wgsl"
 
 // Of a pixel's random stream: that of the glossy layer.
@@ -9,12 +9,7 @@ const GLOSSY_BRANCH: u32 = 1u;
 
 // The mean of the run's samples.
 fn glossy_direct(hit: Hit, wo: vec3<f32>, pixel: u32) -> vec3<f32> {
-    let stream = hash_end(hash_next(hash_next(hash_next(hash_start(), params.seed), params.frame), pixel));
+    let stream = hash3(params.seed, params.frame, pixel);
     let branch = hash_end(hash_next(hash_next(hash_start(), stream), GLOSSY_BRANCH));
-    var sum = vec3(0.0);
-    for (var k = 0u; k < params.samples; k++) {
-        var s = sampler_new(branch, k);
-        sum += integrate(Start(hit, wo, Query(NON_DIFFUSE, 1.0), 0.0, true), PathParams(1u, NONE), &s);
-    }
-    return sum / f32(max(params.samples, 1u));
+    return direct_at(hit, wo, Query(NON_DIFFUSE, 1.0), params.samples, branch);
 }

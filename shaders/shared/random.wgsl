@@ -51,6 +51,11 @@ fn hash_end(h: vec2<u32>) -> u32 {
     return hash64(h).y;
 }
 
+// hash_words of three words: the random stream of a seed, a frame and a pixel, among others.
+fn hash3(a: u32, b: u32, c: u32) -> u32 {
+    return hash_end(hash_next(hash_next(hash_next(hash_start(), a), b), c));
+}
+
 fn unit(bits: u32) -> f32 {
     return f32(bits >> 8u) * (1.0 / 16777216.0);
 }

@@ -88,6 +88,7 @@ pub(crate) const FILES: &[(&str, &str)] = files![
     "shared/camera.wgsl",
     "shared/camera_ray.wgsl",
     "shared/closest.wgsl",
+    "shared/direct_at.wgsl",
     "shared/direct_light.wgsl",
     "shared/envmap.wgsl",
     "shared/factors.wgsl",

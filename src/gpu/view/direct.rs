@@ -1,11 +1,10 @@
 //! Light straight from emitters in every pixel: the twin of [`crate::view::direct`].
 
-use super::pixel_run::{PIXEL_RUN, PixelRun, runs};
+use super::pixel_run::{PIXEL_RUN, PixelPass};
 use super::{PIXEL, REFLECTED, SHADING, ViewBuffers};
 use crate::Result;
 use crate::gpu::camera::CAMERA;
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, area};
 use crate::gpu::scene::GpuScene;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::KernelSpec;
@@ -22,11 +21,11 @@ pub(crate) const DIRECT_LIGHT: KernelSpec = KernelSpec {
 };
 
 /// The kernel, compiled.
-pub(crate) struct DirectLight(Kernel);
+pub(crate) struct DirectLight(PixelPass);
 
 impl DirectLight {
     pub(crate) fn new(scene: &GpuScene) -> Result<Self> {
-        Ok(Self(Kernel::in_scene(scene, &DIRECT_LIGHT, &[])?))
+        Ok(Self(PixelPass::new(scene, &DIRECT_LIGHT)?))
     }
 
     /// Takes another scene of the same triangles.
@@ -38,18 +37,14 @@ impl DirectLight {
     pub(crate) fn run(
         &self,
         scene: &GpuScene,
-        (commands, pass): (&mut Commands, &'static str),
+        pass: (&mut Commands, &'static str),
         (camera, view): (&Camera, &ViewBuffers),
         samples: u32,
         seeds: [u32; 2],
     ) -> Result<()> {
-        if samples == 0 {
-            return Ok(());
+        match samples {
+            0 => Ok(()),
+            _ => self.0.run(&scene.gpu, pass, camera, (samples, seeds), samples, &[&view.pixels, &view.shading]),
         }
-        for run in runs(area(view.size) as u32, samples) {
-            let params = scene.gpu.uniform("parameters of direct light", &PixelRun::new(camera, seeds, run, samples))?;
-            commands.run(pass, &self.0, &[&params, &view.pixels, &view.shading], [run.1, 1]);
-        }
-        Ok(())
     }
 }

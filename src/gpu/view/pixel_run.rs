@@ -1,7 +1,12 @@
 //! Runs of a view's pixels: what a dispatch covers that is to take well below a second on a slow GPU.
 
+use crate::Result;
+use crate::gpu::Gpu;
 use crate::gpu::camera::GpuCamera;
-use crate::gpu::spec::{StructLayout, layout};
+use crate::gpu::commands::Commands;
+use crate::gpu::kernel::{Kernel, area};
+use crate::gpu::scene::GpuScene;
+use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
 
@@ -33,6 +38,37 @@ impl PixelRun {
 pub(crate) fn runs(count: u32, paths: u32) -> impl Iterator<Item = (u32, u32)> {
     let most = (MOST_PATHS / paths.max(1)).max(1);
     (0..count).step_by(most as usize).map(move |first| (first, most.min(count - first)))
+}
+
+/// A kernel of a scene that covers a view in such runs.
+pub(crate) struct PixelPass(Kernel);
+
+impl PixelPass {
+    pub(crate) fn new(scene: &GpuScene, spec: &'static KernelSpec) -> Result<Self> {
+        Ok(Self(Kernel::in_scene(scene, spec, &[])?))
+    }
+
+    /// Takes another scene of the same triangles.
+    pub(crate) fn rebind(&mut self, scene: &GpuScene) {
+        self.0.rebind(scene);
+    }
+
+    /// Covers a view, each of whose pixels takes as long as so many paths; `buffers` come after the parameters.
+    pub(crate) fn run(
+        &self,
+        gpu: &Gpu,
+        (commands, pass): (&mut Commands, &'static str),
+        camera: &Camera,
+        (samples, seeds): (u32, [u32; 2]),
+        paths: u32,
+        buffers: &[&wgpu::Buffer],
+    ) -> Result<()> {
+        for run in runs(area(camera.size) as u32, paths) {
+            let params = gpu.uniform("parameters of a run of pixels", &PixelRun::new(camera, seeds, run, samples))?;
+            commands.run(pass, &self.0, &[&[&params], buffers].concat(), [run.1, 1]);
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,11 @@
 //! What mirrors and polished surfaces show: rays that follow their lobes, and the same light where they end.
 //!
 //! *Paper*: its exponents end at 60, and it leaves specular reflection out. *Ours*: a lobe as sharp as that, or sharper, is not gathered for, as
-//! clusters would be seen one by one in it: rays follow it ([`ManyLightParams::mirror_rays`]), and what they meet is lit as a view's points are,
+//! clusters would be seen one by one in it: rays follow it ([`super::params::ManyLightParams::mirror_rays`]), and what they meet is lit as a view's points are,
 //! straight from emitters and by the gather. They see what is in their way. Light straight from emitters, which rays may meet too, is left to
 //! the pass that samples it. By default a lobe has one ray, in the mirror direction: what is polished shows as sharp an image as a mirror, and
-//! no noise ([`ManyLightParams::mirror_samples`]).
+//! no noise ([`super::params::ManyLightParams::mirror_samples`]).
 
-use super::params::ManyLightParams;
 use super::shade::Shading;
 use crate::base::math::{Rgb, hash_words};
 use crate::material::Surface;
@@ -23,16 +22,11 @@ pub(crate) const RAY: u32 = 0x6d69_7272;
 /// Branch of a ray's stream: light straight from emitters where it ends.
 pub(crate) const STRAIGHT: u32 = 1;
 
-/// Whether rays follow a lobe of this alpha.
-pub fn is_followed(alpha: f32, params: &ManyLightParams) -> bool {
-    params.mirror_rays > 0 && alpha <= params.mirror_alpha
-}
-
 impl Shading<'_> {
     /// What lobes that are followed add to the glossy layer of indirect light, and at how many pixels.
     pub fn followed(&self, view: &GBuffer) -> (Vec<Rgb>, usize) {
         let [seed, frame] = self.seeds;
-        let is_mirror = |p: &Pixel| p.alpha.is_some_and(|alpha| is_followed(alpha, self.params));
+        let is_mirror = |p: &Pixel| p.alpha.is_some_and(|alpha| self.params.follows(alpha));
         let layer = view.shade([hash_words(&[seed, RAY]), frame], |p, stream| {
             if !is_mirror(p) {
                 return Rgb::ZERO;
@@ -57,7 +51,7 @@ impl Shading<'_> {
             throughput *= weight;
             (surface, wo) = (hit, -d);
             let alpha = view_alpha(self.world, &surface, wo);
-            let goes_on = left > 0 && alpha.is_some_and(|alpha| is_followed(alpha, self.params));
+            let goes_on = left > 0 && alpha.is_some_and(|alpha| self.params.follows(alpha));
             sum +=
                 throughput * self.scattered_at(&surface, wo, alpha.filter(|_| !goes_on), straight, hash_words(&[stream, left]));
             if !goes_on {

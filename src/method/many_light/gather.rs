@@ -10,13 +10,12 @@ use super::descend::{Descent, Receiver};
 use super::disc;
 use super::emit::Emission;
 use super::lobe::Lobe;
-use super::mixture::{MOST_LOBES, Mixture};
-use super::params::{Kernel, MOST_SHADOW_RAYS, ManyLightParams};
+use super::params::{Kernel, MOST_LOBES, MOST_SHADOW_RAYS, ManyLightParams};
 use super::tree::Tree;
-use crate::base::math::{Basis, Rgb, hash64, luminance, unit};
+use crate::base::math::{Basis, Rgb, hash64, unit};
 use crate::material::bsdf::warp::direction;
 use glam::Vec3;
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::f32::consts::{PI, TAU};
 
 /// Directions within a spherical light's cone.
 pub(crate) const CONE: u32 = 8;
@@ -57,25 +56,21 @@ pub struct Gather {
 impl Gather {
     /// Of a tree's lights: means over each node's, by area, and filtered lobes (§2.1).
     pub fn new(tree: &Tree, forest: &Forest, emissions: &[Emission], params: &ManyLightParams) -> Self {
-        let mut sums = vec![(Rgb::ZERO, Mixture::default()); tree.clusters.len()];
+        let mut sums = vec![Emission::default(); tree.clusters.len()];
         for (i, cluster) in tree.clusters.iter().enumerate().rev() {
             sums[i] = if cluster.is_leaf() {
-                let emission = &emissions[tree.order[cluster.first as usize] as usize];
-                (emission.diffuse * cluster.area, emission.lobes.refiltered(cluster.area))
+                let Emission { diffuse, lobes } = &emissions[tree.order[cluster.first as usize] as usize];
+                Emission { diffuse: *diffuse * cluster.area, lobes: lobes.refiltered(cluster.area) }
             } else {
-                let (left, right) = (sums[i + 1], sums[tree.clusters[i + 1].skip as usize]);
-                let mut lobes = left.1;
-                lobes.merge(&right.1, 1.0);
-                (left.0 + right.0, lobes)
+                let mut sum = sums[i + 1];
+                sum.add(&sums[tree.clusters[i + 1].skip as usize], 1.0);
+                sum
             };
         }
-        let radiance = |i: usize| {
-            let (diffuse, lobes) = &sums[i];
-            (luminance(*diffuse) + lobes.weight() * FRAC_1_PI) / tree.clusters[i].area.max(f32::MIN_POSITIVE)
-        };
+        let radiance = |i: usize| sums[i].weight() / tree.clusters[i].area.max(f32::MIN_POSITIVE);
         let mean = if sums.is_empty() { 0.0 } else { radiance(0) }.max(f32::MIN_POSITIVE);
         let node = |((&i, &skip), &last): ((&u32, &u32), &bool)| {
-            let (cluster, (diffuse, lobes)) = (&tree.clusters[i as usize], &sums[i as usize]);
+            let (cluster, Emission { diffuse, lobes }) = (&tree.clusters[i as usize], &sums[i as usize]);
             let area = cluster.area.max(f32::MIN_POSITIVE);
             let [lobe, more @ ..] = lobes.filtered().map(|lobe| Lobe { magnitude: lobe.magnitude / area, ..lobe });
             let node = Node {

@@ -5,11 +5,10 @@
 //! Gaussians of their exponents, whose products have closed integrals. One lobe at most is the paper's sum, to the bit.
 
 use super::lobe::{Lobe, LobeSum};
+use super::params::MOST_LOBES;
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
-/// Most lobes of a mixture.
-pub const MOST_LOBES: usize = 4;
 /// Least sharpness of a Gaussian here: 1 % from even over the sphere.
 const LEAST_SHARPNESS: f32 = 0.01;
 

@@ -29,6 +29,7 @@ pub mod repel;
 mod row;
 pub mod settle;
 pub mod shade;
+pub mod tally;
 #[cfg(test)]
 mod tests;
 pub mod tree;

@@ -1,12 +1,13 @@
 //! How frames are made of many lights.
 
-use super::mixture::MOST_LOBES;
 use crate::Result;
 use crate::base::named::{Parameters, within, words};
 use crate::view::MOST_SUPERSAMPLES;
 use crate::view::denoise::DenoiseParams;
 use serde::{Deserialize, Serialize};
 
+/// Most lobes of a node.
+pub(crate) const MOST_LOBES: usize = 4;
 /// Most shadow rays of a gather.
 pub(crate) const MOST_SHADOW_RAYS: usize = 16;
 
@@ -146,6 +147,13 @@ impl Default for ManyLightParams {
             threshold: 0.3,
             denoise: None,
         }
+    }
+}
+
+impl ManyLightParams {
+    /// Whether rays follow a lobe of this alpha.
+    pub fn follows(&self, alpha: f32) -> bool {
+        self.mirror_rays > 0 && alpha <= self.mirror_alpha
     }
 }
 

@@ -4,10 +4,11 @@ use super::adaptive::{Filled, Sampler};
 use super::arrival::Received;
 use super::bounce::{Structure, light, sites};
 use super::gather::Gather;
-use super::gpu::{ManyLightOnGpu, Tally};
+use super::gpu::ManyLightOnGpu;
 use super::params::ManyLightParams;
 use super::points::{Places, place};
 use super::shade::{Light, Shading};
+use super::tally::Tally;
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{apply, tree};
@@ -84,10 +85,16 @@ struct OnCpu<'a> {
     gather: Option<Gather>,
 }
 
-fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
-    let params: ManyLightParams = setup.parameters()?;
+/// The world of an animation's first frame, and where lights lie in it or, where nothing moves, in the scene's.
+fn placed(setup: &Setup, params: &ManyLightParams) -> (Option<World>, Places) {
     let first = setup.animation.map(|animation| setup.world.at(animation, 0));
     let places = place(first.as_ref().unwrap_or(setup.world), params.vpls, params.repulsion, setup.seed);
+    (first, places)
+}
+
+fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
+    let params: ManyLightParams = setup.parameters()?;
+    let places = placed(setup, &params).1;
     Ok(Box::new(OnCpu { setup: *setup, params, places, structure: None, gather: None }))
 }
 
@@ -183,19 +190,6 @@ fn counts(filled: &Filled<Sample>, mirrors: usize) -> Tally {
     Tally { points: visited().count() as u32, nodes: [ends[0], ends[1], visited().sum()], mirrors: mirrors as u32 }
 }
 
-impl Tally {
-    fn listed(&self) -> Vec<(&'static str, f64)> {
-        let [least, most, sum] = self.nodes.map(|n| n as f64);
-        vec![
-            ("shading points", self.points.into()),
-            ("least nodes", least),
-            ("most nodes", most),
-            ("mean nodes", sum / f64::from(self.points.max(1))),
-            ("mirror pixels", self.mirrors.into()),
-        ]
-    }
-}
-
 struct OnGpu<'a> {
     setup: Setup<'a>,
     params: ManyLightParams,
@@ -205,9 +199,8 @@ struct OnGpu<'a> {
 
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let params: ManyLightParams = setup.parameters()?;
-    let first = setup.animation.map(|animation| setup.world.at(animation, 0));
+    let (first, places) = placed(setup, &params);
     let world = first.as_ref().unwrap_or(setup.world);
-    let places = place(world, params.vpls, params.repulsion, setup.seed);
     let sites = sites(world, &places, &params);
     let structure = Structure::new(&sites, &params, setup.seed);
     let mut lights = ManyLightOnGpu::new(gpu, setup.world, (&sites, &structure), &params)?;

@@ -8,7 +8,6 @@ use super::arrival::{Arrival, Received};
 use super::bounce::Structure;
 use super::descend::{Cone, Receiver};
 use super::emit::{Site, exponent};
-use super::follow::is_followed;
 use super::gather::Gather;
 use super::lobe::density;
 use super::params::ManyLightParams;
@@ -64,7 +63,7 @@ impl Shading<'_> {
     /// Indirect light at a pixel, and the nodes that were visited for it.
     pub fn light(&self, i: usize, p: &Pixel) -> (Light, u32) {
         let [seed, frame] = self.seeds;
-        let alpha = p.alpha.filter(|&alpha| !is_followed(alpha, self.params));
+        let alpha = p.alpha.filter(|&alpha| !self.params.follows(alpha));
         self.gathered(&p.surface, p.wo, alpha, hash_words(&[seed, frame, PIXEL, i as u32]))
     }
 

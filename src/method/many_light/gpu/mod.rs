@@ -11,6 +11,7 @@ use super::bounce::Structure;
 use super::emit::Site;
 use super::gather;
 use super::params::{Kernel as LobeShape, Traversal};
+use super::tally::Tally;
 use crate::gpu::Gpu;
 use crate::gpu::camera::GpuCamera;
 use crate::gpu::commands::Commands;
@@ -129,16 +130,6 @@ pub struct ManyLightOnGpu {
     params: ManyLightParams,
     /// Whether the lights' light is that of the scene.
     is_lit: bool,
-}
-
-/// What a frame's sampling came to.
-pub struct Tally {
-    /// Pixels at which light was gathered.
-    pub points: u32,
-    /// The least, the most and the sum of the nodes that were visited for them.
-    pub nodes: [u64; 3],
-    /// Pixels whose lobes rays follow.
-    pub mirrors: u32,
 }
 
 impl ManyLightOnGpu {

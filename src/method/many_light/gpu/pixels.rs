@@ -1,7 +1,7 @@
 //! Pixels that are chosen and lit on a device: the twin of [`super::super::adaptive`] and of [`super::super::shade`].
 
 use super::lights::{GATHER_PATHS, GpuLights, NODE, SITE};
-use super::{PARAMS, Params, Tally, constants};
+use super::{PARAMS, Params, constants};
 use crate::Result;
 use crate::gpu::Gpu;
 use crate::gpu::camera::CAMERA;
@@ -11,9 +11,10 @@ use crate::gpu::scene::GpuScene;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::frame::Target;
-use crate::gpu::view::pixel_run::{PIXEL_RUN, PixelRun, runs};
+use crate::gpu::view::pixel_run::{PIXEL_RUN, PixelPass, runs};
 use crate::gpu::view::{PIXEL, REFLECTED, SHADING};
 use crate::method::many_light::adaptive::coarsest;
+use crate::method::many_light::tally::Tally;
 use crate::method::many_light::{ManyLightParams, Sampling};
 use crate::scene::Camera;
 use crate::transport::World;
@@ -117,7 +118,7 @@ pub(super) struct GpuPixels {
     choose: Kernel,
     expose: Kernel,
     light: Kernel,
-    layers: Kernel,
+    layers: PixelPass,
     /// Where rays follow lobes.
     follow: Option<Kernel>,
     mirror_samples: u32,
@@ -133,13 +134,14 @@ impl GpuPixels {
     pub(super) fn new(scene: &GpuScene, world: &World, params: &ManyLightParams) -> Result<Self> {
         let gpu = &scene.gpu;
         let [kernel, shadows] = constants(params);
+        let of_gather = [kernel, shadows];
         let of_rays = [kernel, shadows, ("MIRROR_SAMPLES", params.mirror_samples.into())];
         let (lower, upper) = world.scene.geometry.bounds();
         Ok(Self {
             choose: Kernel::in_scene(scene, &CHOOSE_PIXELS, &[])?,
             expose: Kernel::new(gpu, &EXPOSE)?,
-            light: Kernel::in_scene(scene, &LIGHT_PIXELS, &constants(params))?,
-            layers: Kernel::in_scene(scene, &VIEW_LAYERS, &[])?,
+            light: Kernel::in_scene(scene, &LIGHT_PIXELS, &of_gather)?,
+            layers: PixelPass::new(scene, &VIEW_LAYERS)?,
             follow: (params.mirror_rays > 0).then(|| Kernel::in_scene(scene, &FOLLOW_LOBES, &of_rays)).transpose()?,
             mirror_samples: params.mirror_samples,
             tally: Kernel::new(gpu, &TALLY)?,
@@ -213,12 +215,8 @@ impl GpuPixels {
         (samples, seeds): (u32, [u32; 2]),
     ) -> Result<()> {
         let Some(lit) = &self.lit else { return Ok(()) };
-        for run in runs(area(target.view.size) as u32, samples) {
-            let params = gpu.uniform("parameters of layers", &PixelRun::new(camera, seeds, run, samples))?;
-            let buffers = [&params, &target.view.pixels, &target.view.shading, &target.glossy, lit];
-            commands.run("direct", &self.layers, &buffers, [run.1, 1]);
-        }
-        Ok(())
+        let buffers = [&target.view.pixels, &target.view.shading, &target.glossy, lit];
+        self.layers.run(gpu, (commands, "direct"), camera, (samples, seeds), samples, &buffers)
     }
 
     /// Adds what rays along sharp lobes bring to the glossy layer.

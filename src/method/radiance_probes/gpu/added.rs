@@ -6,12 +6,12 @@ use crate::Result;
 use crate::gpu::Gpu;
 use crate::gpu::camera::CAMERA;
 use crate::gpu::commands::Commands;
-use crate::gpu::kernel::{Kernel, area};
+use crate::gpu::kernel::Kernel;
 use crate::gpu::scene::GpuScene;
 use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::frame::Target;
-use crate::gpu::view::pixel_run::{PIXEL_RUN, PixelRun, runs};
+use crate::gpu::view::pixel_run::{PIXEL_RUN, PixelPass, runs};
 use crate::gpu::view::{PIXEL, REFLECTED, SHADING};
 use crate::material::Surface;
 use crate::method::radiance_probes::volume::{NUMBERS, Volume};
@@ -231,34 +231,15 @@ impl GpuBlockers {
     }
 }
 
-/// The kernel that lights shapes which frames add, compiled.
-pub(super) struct AddedLight(Kernel);
-
-impl AddedLight {
-    pub(super) fn new(scene: &GpuScene) -> Result<Self> {
-        Ok(Self(Kernel::in_scene(scene, &ADDED_LIGHT, &[])?))
-    }
-
-    /// Takes another scene of the same triangles.
-    pub(super) fn rebind(&mut self, scene: &GpuScene) {
-        self.0.rebind(scene);
-    }
-
-    /// Puts the diffuse layer of what the frame adds into a view, without light straight from emitters.
-    pub(super) fn run(
-        &self,
-        scene: &GpuScene,
-        commands: &mut Commands,
-        (camera, target): (&Camera, &Target),
-        volume: &GpuVolume,
-    ) -> Result<()> {
-        let (view, Places { params: grid, cells }) = (&target.view, &volume.places);
-        for run in runs(area(view.size) as u32, RAYS) {
-            let params = PixelRun::new(camera, [0; 2], run, 0);
-            let params = scene.gpu.uniform("parameters of light on what a frame adds", &params)?;
-            let buffers = [&params, grid, cells, &view.pixels, &volume.clusters.light, &view.shading];
-            commands.run("diffuse", &self.0, &buffers, [run.1, 1]);
-        }
-        Ok(())
-    }
+/// Puts the diffuse layer of what the frame adds into a view, without light straight from emitters.
+pub(super) fn light_added(
+    pass: &PixelPass,
+    gpu: &Gpu,
+    commands: &mut Commands,
+    (camera, target): (&Camera, &Target),
+    volume: &GpuVolume,
+) -> Result<()> {
+    let (view, Places { params: grid, cells }) = (&target.view, &volume.places);
+    let buffers = [grid, cells, &view.pixels, &volume.clusters.light, &view.shading];
+    pass.run(gpu, (commands, "diffuse"), camera, (0, [0; 2]), RAYS, &buffers)
 }

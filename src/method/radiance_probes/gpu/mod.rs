@@ -20,14 +20,14 @@ use crate::gpu::spec::Access::{Read, ReadWrite, Uniform};
 use crate::gpu::spec::{KernelSpec, StructLayout, layout};
 use crate::gpu::view::direct::DirectLight;
 use crate::gpu::view::frame::{Baseline, BaselineFrame, Target};
-use crate::gpu::view::pixel_run::runs;
+use crate::gpu::view::pixel_run::{PixelPass, runs};
 use crate::lightmap::LightMap;
 use crate::lightmap::receivers::{POINTS, Receiver};
 use crate::scene::Camera;
 use crate::transport::World;
-use added::{AddedLight, GpuBlockers};
+use added::{ADDED_LIGHT, GpuBlockers, light_added};
 use bytemuck::{Pod, Zeroable, cast_slice};
-use first_order::FirstOrder;
+use first_order::FIRST_ORDER;
 use glam::Vec4;
 use light_map::MapLight;
 use operator::GpuOperator;
@@ -68,11 +68,11 @@ pub struct RadianceProbesOnGpu {
     map: MapLight,
     direct: DirectLight,
     /// Where there are receivers in free space.
-    added_light: Option<AddedLight>,
+    added_light: Option<PixelPass>,
     /// Whether the frame adds shapes.
     has_added: bool,
     /// Where receivers keep sh1.
-    first_order: Option<FirstOrder>,
+    first_order: Option<PixelPass>,
     params: RadianceProbeParams,
 }
 
@@ -110,11 +110,11 @@ impl RadianceProbesOnGpu {
             receivers: gpu.upload("receivers", cast_slice(&words))?,
             count: transport.receivers.len() as u32,
             blockers: GpuBlockers::new(scene, operator.volume.as_ref())?,
-            added_light: operator.volume.as_ref().map(|_| AddedLight::new(scene)).transpose()?,
+            added_light: operator.volume.as_ref().map(|_| PixelPass::new(scene, &ADDED_LIGHT)).transpose()?,
             has_added: false,
             operator,
             map: MapLight::new(scene, &map, numbers as u32)?,
-            first_order: (transport.params.receiver == Kept::Sh1).then(|| FirstOrder::new(scene)).transpose()?,
+            first_order: (transport.params.receiver == Kept::Sh1).then(|| PixelPass::new(scene, &FIRST_ORDER)).transpose()?,
             direct: DirectLight::new(scene)?,
             params: *params,
             baseline,
@@ -194,11 +194,14 @@ impl RadianceProbesOnGpu {
         let added_light = self.added_light.as_ref().zip(self.operator.volume.as_ref()).filter(|_| self.has_added);
         self.baseline.frame(camera, false, commands, |commands, camera: &Camera, target: &Target| {
             match first_order {
-                Some(first_order) => first_order.run(&scene, commands, (camera, target), samples, [seed, frame])?,
+                Some(first_order) => {
+                    let buffers = [&target.view.pixels, &target.view.shading, &target.glossy];
+                    first_order.run(gpu, (commands, "glossy"), camera, (samples, [seed, frame]), samples, &buffers)?;
+                }
                 None => gpu.clear(&target.glossy),
             }
             if let Some((added_light, volume)) = added_light {
-                added_light.run(&scene, commands, (camera, target), volume)?;
+                light_added(added_light, gpu, commands, (camera, target), volume)?;
             }
             direct.run(&scene, (commands, "diffuse"), (camera, &target.view), samples, [seed, frame])
         })
