@@ -14,7 +14,8 @@ use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::scene::{Camera, Scene};
 use reprobe::surface::CurvatureMap;
 use reprobe::transport::World;
-use reprobe::view::denoise::{DenoiseParams, Guide, denoise};
+use reprobe::view::denoise::{DenoiseParams, Guide};
+use reprobe::view::denoiser::Denoiser;
 use reprobe::view::gbuffer::{GBuffer, gbuffer};
 use reprobe::view::layers::LayerImages;
 use std::f32::consts::PI;
@@ -279,21 +280,21 @@ fn noisy(noise: f32) -> ([Vec<Guide>; 2], Vec<Rgb>, LayerImages) {
 
 #[test]
 fn the_denoiser_takes_noise_and_leaves_edges_and_texture() {
-    let params = DenoiseParams::default();
+    let denoiser = Denoiser::Filter(DenoiseParams::default());
     let rmse = |a: &[Rgb], b: &[Rgb]| {
         (a.iter().zip(b).map(|(a, b)| (*a - *b).length_squared()).sum::<f32>() / (3 * a.len()) as f32).sqrt()
     };
     let (guides, clean, layers) = noisy(0.0);
-    let same = denoise(&layers, &guides, 64, &params);
+    let same = denoiser.denoise(&layers, &guides, 64).unwrap();
     assert_eq!(same.emission, layers.emission);
     assert!(rmse(&same.diffuse, &clean) < 1e-4 && rmse(&same.glossy, &clean) < 1e-4, "{}", rmse(&same.diffuse, &clean));
     let (guides, clean, layers) = noisy(0.1);
-    let better = denoise(&layers, &guides, 64, &params);
+    let better = denoiser.denoise(&layers, &guides, 64).unwrap();
     let (before, after) = (rmse(&layers.diffuse, &clean), rmse(&better.diffuse, &clean));
     assert!(after < 0.25 * before, "{before} before, {after} after");
     // One sample of a rare path is no light of its neighbours'.
     let mut spot = layers;
     spot.glossy[30 * 64 + 30] = Rgb::splat(500.0);
-    let cut = denoise(&spot, &guides, 64, &params);
+    let cut = denoiser.denoise(&spot, &guides, 64).unwrap();
     assert!(rmse(&cut.glossy, &clean) < 1.5 * after, "{}", rmse(&cut.glossy, &clean));
 }

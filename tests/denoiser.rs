@@ -118,6 +118,25 @@ fn parameters_of_the_denoisers_are_named_and_checked() {
 }
 
 #[test]
+fn many_lights_have_either_denoiser_with_its_parameters() {
+    let f = folder();
+    let command = |out: &str, more: &str| {
+        format!("render-path scene.xml --path path.json --method many-light --set vpls=64 --json -o {out} {more}")
+    };
+    f.success(&command("filter", "--denoise=filter --set denoise.filter.levels=2"));
+    let (denoiser, filtered) = frame(&f, "filter");
+    assert_eq!(denoiser["filter"]["levels"], 2, "{denoiser}");
+    let message = f.refusal(&command("x", "--denoise=filter --set denoise.filter.levels=13"));
+    assert!(message.contains("levels=13: expected 0 to 12"), "{message}");
+    if has_library("many_lights_have_either_denoiser_with_its_parameters") {
+        f.success(&command("oidn", "--denoise=oidn"));
+        let (denoiser, bytes) = frame(&f, "oidn");
+        assert_eq!(denoiser["oidn"]["version"][0], 2, "{denoiser}");
+        assert!(bytes != filtered);
+    }
+}
+
+#[test]
 fn frames_say_which_denoiser_they_had_and_have_the_same_bits_on_any_number_of_threads() {
     if !has_library("frames_say_which_denoiser_they_had_and_have_the_same_bits_on_any_number_of_threads") {
         return;

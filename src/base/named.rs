@@ -49,7 +49,7 @@ pub fn apply<T: Parameters>(params: &T, sets: &[String]) -> Result<T> {
     let mut tree = tree(params)?;
     for set in sets {
         let (name, text) = set.split_once('=').ok_or_else(|| Error::Request(format!("--set {set}: expected NAME=VALUE")))?;
-        let value = serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.into()));
+        let value = value(text);
         let slot = find(&mut tree, name)
             .ok_or_else(|| Error::Request(format!("--set {set}: no such parameter; there are\n{}", list(params))))?;
         *slot = value;
@@ -61,6 +61,12 @@ pub fn apply<T: Parameters>(params: &T, sets: &[String]) -> Result<T> {
     let params: T = read(&tree).map_err(|e| Error::Request(e.to_string()))?;
     params.validate()?;
     Ok(params)
+}
+
+/// What a text says: JSON, a number as people write it (.5), or itself.
+fn value(text: &str) -> Value {
+    let number = || text.parse().ok().and_then(serde_json::Number::from_f64).map(Value::Number);
+    serde_json::from_str(text).ok().or_else(number).unwrap_or_else(|| Value::String(text.into()))
 }
 
 /// Parameters as JSON.
@@ -156,6 +162,7 @@ mod tests {
     fn fields_are_set_by_name_and_wrong_names_list_the_right_ones() {
         let set = |s: &str| apply(&example(), &[s.to_owned()]);
         assert_eq!(set("falloff=4").unwrap().falloff, 4.0);
+        assert_eq!(set("falloff=.5").unwrap().falloff, 0.5);
         assert_eq!(set("search.0.radius=1").unwrap().search[0].radius, 1);
         assert!(set("filter=null").unwrap().filter.is_none());
         let message = set("fallof=4").unwrap_err().to_string();

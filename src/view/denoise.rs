@@ -17,7 +17,6 @@ use crate::material::bsdf::Lobes;
 use crate::scene::Camera;
 use crate::transport::{Sampler, World};
 use crate::view::gbuffer::GLOSSY;
-use crate::view::layers::LayerImages;
 use crate::view::mirror::{facing_normal, mirror_direction};
 use crate::view::mirror_light::glossy_albedo;
 use glam::{Vec2, Vec3};
@@ -154,15 +153,6 @@ fn surface_guides(world: &World, s: &Surface, wo: Vec3, mirror_alpha: f32) -> [G
         None => Guide { normal: Vec3::ZERO, depth: FAR, albedo: lobe, factor: lobe },
     };
     [plain(diffuse), through]
-}
-
-/// Filters the diffuse and the glossy layer; emission is without noise.
-pub fn denoise(layers: &LayerImages, guides: &[Vec<Guide>; 2], width: usize, params: &DenoiseParams) -> LayerImages {
-    LayerImages {
-        emission: layers.emission.clone(),
-        diffuse: filter_layer(&layers.diffuse, &guides[0], width, params),
-        glossy: filter_layer(&layers.glossy, &guides[1], width, params),
-    }
 }
 
 /// One layer's light, albedo divided out, and the variance of its luminance.

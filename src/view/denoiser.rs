@@ -4,8 +4,8 @@
 //! the other.
 
 use crate::base::math::Rgb;
-use crate::base::named::{apply, words};
-use crate::view::denoise::{self, DenoiseParams, GUIDE_SAMPLES, Guide};
+use crate::base::named::{Parameters, apply, words};
+use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, filter_layer};
 use crate::view::layers::LayerImages;
 use crate::view::oidn::{self, Oidn, OidnParams};
 use crate::{Error, Result};
@@ -79,7 +79,7 @@ impl Denoiser {
     /// One layer without its noise, on the CPU.
     pub fn denoise_layer(&self, layer: &[Rgb], guides: &[Guide], width: usize) -> Result<Vec<Rgb>> {
         match self {
-            Self::Filter(params) => Ok(denoise::filter_layer(layer, guides, width, params)),
+            Self::Filter(params) => Ok(filter_layer(layer, guides, width, params)),
             Self::Oidn { .. } => oidn::denoise_layer(layer, guides, width),
         }
     }
@@ -91,6 +91,15 @@ impl Denoiser {
             diffuse: self.denoise_layer(&layers.diffuse, &guides[0], width)?,
             glossy: self.denoise_layer(&layers.glossy, &guides[1], width)?,
         })
+    }
+}
+
+impl Parameters for Denoiser {
+    fn validate(&self) -> Result<()> {
+        match self {
+            Self::Filter(params) => params.validate(),
+            Self::Oidn { params, .. } => params.validate(),
+        }
     }
 }
 

@@ -9,7 +9,8 @@ use reprobe::method::path_trace::denoise_gpu::{Denoiser, GpuGuides};
 use reprobe::method::path_trace::{PathTraceParams, path_trace};
 use reprobe::scene::Camera;
 use reprobe::transport::World;
-use reprobe::view::denoise::{DenoiseParams, Guide, denoise, guides};
+use reprobe::view::denoise::{DenoiseParams, Guide, guides};
+use reprobe::view::denoiser::Denoiser as OnCpu;
 use std::sync::Arc;
 
 fn rmse(a: &[Rgb], b: &[Rgb]) -> f32 {
@@ -41,7 +42,7 @@ fn check(gpu: &Arc<Gpu>, world: &World, camera: &Camera, params: &DenoiseParams,
     }
     let noisy = path_trace(world, camera, &PathTraceParams { spp, ..PathTraceParams::default() }, seed, frame, &Silent);
     let width = camera.size[0] as usize;
-    let expected = denoise(&noisy, &cpu, width, params);
+    let expected = OnCpu::Filter(*params).denoise(&noisy, &cpu, width).unwrap();
     let on_gpu = denoiser.denoise(&noisy, &GpuGuides::upload(gpu, &cpu, width).unwrap()).unwrap();
     assert_eq!(on_gpu.emission, noisy.emission);
     for (name, a, b, before) in [

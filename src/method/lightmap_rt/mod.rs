@@ -64,7 +64,8 @@ impl Parameters for LightmapRtParams {
     fn validate(&self) -> Result<()> {
         within("supersample", self.supersample, 1..=MOST_SUPERSAMPLES)?;
         within("samples", self.samples, 1..=1 << 24)?;
-        within("bounces", self.bounces, 1..=u32::MAX)
+        within("bounces", self.bounces, 1..=u32::MAX)?;
+        self.denoise.map_or(Ok(()), |denoise| denoise.validate())
     }
 }
 

@@ -42,10 +42,10 @@ fn parameters(options: &Options) -> Result<Value> {
         supersample: options.supersample.unwrap_or(base.supersample),
         samples: options.samples.unwrap_or(base.samples),
         bounces: options.max_depth.unwrap_or(base.bounces),
+        denoise: options.denoise.map(|wanted| Denoiser::choose(wanted, &[])).transpose()?,
         ..base
     };
-    let denoise = options.denoise.map(|wanted| Denoiser::choose(wanted, &[])).transpose()?;
-    tree(&LightmapRtParams { denoise, ..apply(&base, &options.set)? })
+    tree(&apply(&base, &options.set)?)
 }
 
 struct OnCpu<'a> {

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::base::named::{Parameters, within, words};
 use crate::view::MOST_SUPERSAMPLES;
-use crate::view::denoise::DenoiseParams;
+use crate::view::denoiser::Denoiser;
 use serde::{Deserialize, Serialize};
 
 /// Most lobes of a node.
@@ -111,9 +111,9 @@ pub struct ManyLightParams {
     pub lambda: f32,
     /// epsilon: the coherence error, at a grid of 8 pixels, beyond which a pixel is sampled; it doubles from grid to grid. *Paper*: 0.3.
     pub threshold: f32,
-    /// Of the filter that takes the noise of direct light and of shadow rays out of both layers (`--denoise`); `None` for none.
+    /// Takes the noise of direct light and of shadow rays out of both layers (`--denoise`); `None` for nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub denoise: Option<DenoiseParams>,
+    pub denoise: Option<Denoiser>,
 }
 
 impl Default for ManyLightParams {

@@ -9,6 +9,7 @@ use super::params::ManyLightParams;
 use super::points::{Places, place};
 use super::shade::{Light, Shading};
 use super::tally::Tally;
+use crate::Result;
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{apply, tree};
@@ -19,12 +20,11 @@ use crate::method::{Frame, Method, Options, Reads, Renderer, Setup, as_given};
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
-use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, denoise, guides};
-use crate::view::denoiser::Kind;
+use crate::view::denoise::{GUIDE_SAMPLES, guides};
+use crate::view::denoiser::Denoiser;
 use crate::view::direct::{GLOSSY_BRANCH, direct};
 use crate::view::gbuffer::{GBuffer, GLOSSY};
 use crate::view::layers::LayerImages;
-use crate::{Error, Result};
 use serde_json::Value as Json;
 use std::sync::Arc;
 
@@ -47,14 +47,10 @@ pub const METHOD: Method = Method {
 };
 
 fn parameters(options: &Options) -> Result<Json> {
-    if options.denoise == Some(Some(Kind::Oidn)) {
-        return Err(Error::Request(
-            "--denoise oidn: path-trace and lightmap-rt have it; many-light has the filter alone: --denoise filter".into(),
-        ));
-    }
     let base = ManyLightParams::default();
     let supersample = options.supersample.unwrap_or(base.supersample);
-    let base = ManyLightParams { supersample, denoise: options.denoise.map(|_| DenoiseParams::default()), ..base };
+    let denoise = options.denoise.map(|wanted| Denoiser::choose(wanted, &[])).transpose()?;
+    let base = ManyLightParams { supersample, denoise, ..base };
     tree(&apply(&base, &options.set)?)
 }
 
@@ -160,26 +156,27 @@ impl Renderer for OnCpu<'_> {
         };
         let ([diffuse, glossy], counts) = self.layers(&shading, &g, view.frame, &mut clock);
         let layers = baseline.both_layers(&g, &diffuse, &glossy, &mut clock);
-        let layers = finished(layers, world, view, (&params, setup.seed), &mut clock);
+        let layers = finished(layers, world, view, (&params, setup.seed), &mut clock)?;
         (self.structure, self.gather) = (Some(structure), Some(gather));
         progress.advance(view.camera.size[1].into());
         Ok(Frame { counts: counts.listed(), ..Frame::of(layers, clock.laps) })
     }
 }
 
-/// Layers after the last pass, on the CPU whichever device has made them: the filter, where it is asked for.
+/// Layers after the last pass, on the CPU whichever device has made them: denoised, where that is asked for.
 fn finished(
     layers: LayerImages,
     world: &World,
     view: &View,
     (params, seed): (&ManyLightParams, u32),
     clock: &mut Clock,
-) -> LayerImages {
-    let Some(of) = &params.denoise else { return layers };
-    let guides = guides(world, &view.camera, of.mirror_alpha, GUIDE_SAMPLES, seed, view.frame);
-    let layers = denoise(&layers, &guides, view.camera.size[0] as usize, of);
+) -> Result<LayerImages> {
+    let Some(denoiser) = &params.denoise else { return Ok(layers) };
+    let guides = guides(world, &view.camera, denoiser.mirror_alpha(), GUIDE_SAMPLES, seed, view.frame);
+    clock.lap("guides");
+    let layers = denoiser.denoise(&layers, &guides, view.camera.size[0] as usize)?;
     clock.lap("denoise");
-    layers
+    Ok(layers)
 }
 
 /// Shading points, the nodes that were visited a point, and pixels whose lobes rays follow.
@@ -235,7 +232,7 @@ impl Renderer for OnGpu<'_> {
         let (frame, tally) = self.lights.frame(&view.camera, [self.setup.seed, view.frame])?;
         clock.laps.extend(frame.passes);
         clock.restart();
-        let layers = finished(frame.layers, world, view, (&self.params, self.setup.seed), &mut clock);
+        let layers = finished(frame.layers, world, view, (&self.params, self.setup.seed), &mut clock)?;
         progress.advance(view.camera.size[1].into());
         Ok(Frame { counts: tally.listed(), ..Frame::of(layers, clock.laps) })
     }

@@ -201,7 +201,7 @@ impl Denoiser {
         Ok([read(&guides.layers[0])?, read(&guides.layers[1])?])
     }
 
-    /// The filtered layers, as [`crate::view::denoise::denoise`] has them.
+    /// The filtered layers, as [`crate::view::denoise::filter_layer`] has them.
     pub fn denoise(&self, layers: &LayerImages, guides: &GpuGuides) -> Result<LayerImages> {
         let [diffuse, glossy] = &guides.layers;
         Ok(LayerImages {
