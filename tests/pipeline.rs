@@ -177,6 +177,34 @@ fn render(more: &str) -> String {
 }
 
 #[test]
+fn rays_beside_probes_are_nearer_and_threads_do_not_change_a_bit() {
+    let f = folder();
+    figures(&f, RUN);
+    let size = "scene.xml --path path.json --size 32x18";
+    figures(&f, &format!("render-path {size} --method path-trace --spp 1024 -o reference"));
+    let rays = "--set rays.per_pixel=128 --set rays.window=2";
+    figures(&f, &render(&format!("{rays} --threads 1")));
+    let joined = std::fs::read(f.at("again/0001.exr")).unwrap();
+    std::fs::remove_dir_all(f.at("again")).unwrap();
+    figures(&f, &render(&format!("{rays} --threads 3")));
+    assert!(joined == std::fs::read(f.at("again/0001.exr")).unwrap(), "other bits on other threads");
+    let error = |frames: &str| {
+        let report = figures(&f, &format!("compare {frames} reference --layer glossy -o report"));
+        report["mean"]["rmse_rgb"].as_f64().unwrap()
+    };
+    let [probes, joined] = ["out/frames", "again"].map(error);
+    assert!(joined < 0.9 * probes, "probes {probes}, joined {joined}");
+
+    figures(&f, &render("--set rays.per_pixel=4 --denoise=filter"));
+    let message = f.refusal(&render("--denoise=filter"));
+    assert!(message.contains("--set rays.per_pixel=4"), "{message}");
+    let message = f.refusal(&render("--set rays.per_pixel=1"));
+    assert!(message.contains("0, or 2 and more"), "{message}");
+    let message = f.refusal(&render("--set rays.per_pixel=4").replace("--lightmap out/lightmap.exr", ""));
+    assert!(message.contains("--lightmap FILE"), "{message}");
+}
+
+#[test]
 fn inputs_from_another_scene_or_another_run_are_refused() {
     let f = folder();
     figures(&f, RUN);

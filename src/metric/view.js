@@ -99,11 +99,33 @@ function listen(linked, step, peek) {
     if (e.key === "+" || e.key === "=") return () => linked.zoomTo(view.zoom * 1.25);
     if (e.key === "-") return () => linked.zoomTo(view.zoom / 1.25);
     if (e.key === "0") return linked.fit;
+    if (e.key === "p") return () => $("play").click();
     if (e.key === "r" || (e.key === " " && !on("button"))) return () => { if (!e.repeat) peek(true); };
   };
   addEventListener("keydown", e => { const act = action(e); if (act) { e.preventDefault(); act(); } });
   addEventListener("keyup", e => { if (e.key === " " || e.key === "r") peek(false); });
   addEventListener("blur", () => peek(false));
+}
+
+// The walk as a film: `onward()` shows the next frame, and after the last the first, twelve times a second, or as fast as the pictures come.
+function film(count, images, onward) {
+  let playing = false;
+  const play = $("play");
+  play.hidden = count < 2;
+  const run = async () => {
+    while (playing) {
+      const wait = new Promise(done => setTimeout(done, 1000 / 12));
+      await Promise.all(images.map(image => image.decode().catch(() => {})));
+      await wait;
+      if (playing) onward();
+    }
+  };
+  play.onclick = () => {
+    playing = !playing;
+    play.setAttribute("aria-pressed", playing);
+    play.textContent = playing ? "pause" : "play";
+    if (playing) run();
+  };
 }
 
 // The choice in the address, so that a reload or a link shows the same: `chosen()` tells it, `choose` takes it. Browsers refuse

@@ -76,21 +76,19 @@ impl Denoiser {
         }
     }
 
-    /// One layer without its noise, on the CPU.
-    pub fn denoise_layer(&self, layer: &[Rgb], guides: &[Guide], width: usize) -> Result<Vec<Rgb>> {
+    /// Layers of the same guides without their noise, on the CPU.
+    pub fn denoise_layers<const N: usize>(&self, layers: [&[Rgb]; N], guides: &[Guide], width: usize) -> Result<[Vec<Rgb>; N]> {
         match self {
-            Self::Filter(params) => Ok(filter_layer(layer, guides, width, params)),
-            Self::Oidn { .. } => oidn::denoise_layer(layer, guides, width),
+            Self::Filter(params) => Ok(layers.map(|layer| filter_layer(layer, guides, width, params))),
+            Self::Oidn { .. } => oidn::denoise_layers(layers, guides, width),
         }
     }
 
     /// The diffuse and the glossy layer without their noise, on the CPU; emission has none.
     pub fn denoise(&self, layers: &LayerImages, guides: &[Vec<Guide>; 2], width: usize) -> Result<LayerImages> {
-        Ok(LayerImages {
-            emission: layers.emission.clone(),
-            diffuse: self.denoise_layer(&layers.diffuse, &guides[0], width)?,
-            glossy: self.denoise_layer(&layers.glossy, &guides[1], width)?,
-        })
+        let [diffuse] = self.denoise_layers([&layers.diffuse], &guides[0], width)?;
+        let [glossy] = self.denoise_layers([&layers.glossy], &guides[1], width)?;
+        Ok(LayerImages { emission: layers.emission.clone(), diffuse, glossy })
     }
 }
 

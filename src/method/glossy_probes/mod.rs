@@ -4,7 +4,7 @@
 //! each direction deserves (§4.2.1); [`quasi_harmonic`] turns that into a deformed lat-long mesh, and [`qhmap`] into the probe's
 //! parameterisation (§4.2.2); [`bake`] fills the texels (§4.1), all of them or those that [`wanted`] names.
 //!
-//! A frame, pass by pass: [`renderer`] is the table of contents (§5, §6).
+//! A frame, pass by pass: [`renderer`] is the table of contents (§5, §6). [`rays`] may be joined with it.
 
 pub mod bake;
 pub mod candidates;
@@ -21,6 +21,7 @@ pub mod perturb;
 pub mod previous;
 pub mod qhmap;
 pub mod quasi_harmonic;
+pub mod rays;
 pub mod renderer;
 pub mod resmap;
 mod row;
@@ -33,10 +34,12 @@ pub use row::{METHOD, resolve};
 use crate::Result;
 use crate::base::named::{Parameters, within};
 use crate::view::MOST_SUPERSAMPLES;
+use crate::view::denoiser::Denoiser;
 use coverage::CoverageParams;
 use filter::FilterParams;
 use footprint::FootprintParams;
 use gather::GatherParams;
+use rays::RaysParams;
 use serde::{Deserialize, Serialize};
 
 /// All parameters of the method at run time.
@@ -56,6 +59,12 @@ pub struct GlossyProbeParams {
     pub filter: FilterParams,
     /// Rays along edges.
     pub coverage: CoverageParams,
+    /// Rays along lobes, joined with the probes.
+    #[serde(default)]
+    pub rays: RaysParams,
+    /// Takes the noise out of those; `None` for nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoise: Option<Denoiser>,
 }
 
 impl Default for GlossyProbeParams {
@@ -67,6 +76,8 @@ impl Default for GlossyProbeParams {
             footprint: Some(FootprintParams::default()),
             filter: FilterParams::default(),
             coverage: CoverageParams::default(),
+            rays: RaysParams::default(),
+            denoise: None,
         }
     }
 }
@@ -81,6 +92,8 @@ impl GlossyProbeParams {
             footprint: Some(FootprintParams::paper()),
             filter: FilterParams::paper(),
             coverage: CoverageParams { rays: 0 },
+            rays: RaysParams::default(),
+            denoise: None,
         }
     }
 }
@@ -91,6 +104,8 @@ impl Parameters for GlossyProbeParams {
         self.gather.validate()?;
         self.footprint.as_ref().map_or(Ok(()), FootprintParams::validate)?;
         self.filter.validate()?;
-        self.coverage.validate()
+        self.coverage.validate()?;
+        self.rays.validate()?;
+        self.denoise.map_or(Ok(()), |denoise| denoise.validate())
     }
 }

@@ -3,17 +3,22 @@
 use super::GlossyProbeParams;
 use super::gpu::Renderer as OnGpu;
 use super::inspect::with_passes;
+use super::rays::{RaysParams, Shot, joined};
 use super::renderer::{Renderer as OnCpu, Reprojected};
 use super::wanted::Served;
+use crate::base::clock::Clock;
 use crate::base::named::{apply, tree};
 use crate::base::progress::Progress;
 use crate::gpu::Gpu;
 use crate::io::ExrImage;
+use crate::lightmap::LightMap;
 use crate::method::{Frame, Method, Need, Options, Picture, Probes, Reads, Renderer, Setup, as_given};
 use crate::probe::store::ProbeStore;
 use crate::scene::Camera;
 use crate::surface::CurvatureMap;
+use crate::transport::World;
 use crate::view::View;
+use crate::view::denoiser::Denoiser;
 use crate::view::layers::LayerImages;
 use crate::{Error, Result};
 use serde_json::Value;
@@ -33,7 +38,7 @@ pub const METHOD: Method = Method {
         curvature: Need::Required,
     },
     layers: &["glossy"],
-    options: &["probes", "lightmap", "curvature", "supersample", "gpu-memory", "paper", "set"],
+    options: &["probes", "lightmap", "curvature", "supersample", "denoise", "gpu-memory", "paper", "set"],
     samples: None,
     transmissive: false,
     orthographic: false,
@@ -49,7 +54,12 @@ pub const METHOD: Method = Method {
 pub fn resolve(options: &Options) -> Result<GlossyProbeParams> {
     let base = if options.paper { GlossyProbeParams::paper() } else { GlossyProbeParams::default() };
     let supersample = options.supersample.unwrap_or(base.supersample);
-    apply(&GlossyProbeParams { supersample, ..base }, &options.set)
+    let denoise = options.denoise.map(|wanted| Denoiser::choose(wanted, &[])).transpose()?;
+    let params = apply(&GlossyProbeParams { supersample, denoise, ..base }, &options.set)?;
+    if params.denoise.is_some() && params.rays.per_pixel == 0 {
+        return Err(Error::Request("--denoise: glossy-probes have no noise without rays: --set rays.per_pixel=4".into()));
+    }
+    Ok(params)
 }
 
 fn parameters(options: &Options) -> Result<Value> {
@@ -78,37 +88,70 @@ fn check_serves(folder: &Path, probes: &ProbeStore<Served>, views: &[View], para
     Err(Error::input(folder, message))
 }
 
+/// Rays that are joined with the frames of either renderer, on the CPU.
+struct Rays<'a> {
+    lit: (&'a World, &'a LightMap),
+    params: RaysParams,
+    denoiser: Option<Denoiser>,
+    seed: u32,
+}
+
+impl<'a> Rays<'a> {
+    /// `None` where the parameters have none.
+    fn of(setup: &Setup<'a>, params: &GlossyProbeParams) -> Result<Option<Self>> {
+        if params.rays.per_pixel == 0 {
+            return Ok(None);
+        }
+        let lit = (setup.world, setup.required_lightmap()?);
+        Ok(Some(Self { lit, params: params.rays, denoiser: params.denoise, seed: setup.seed }))
+    }
+}
+
 /// Either renderer, with its probes.
-struct WithProbes<R> {
+struct WithProbes<'a, R> {
     renderer: R,
     probes: ProbeStore<Served>,
+    rays: Option<Rays<'a>>,
     supersample: u32,
 }
 
-impl<R> WithProbes<R> {
-    fn frame(&self, frame: Reprojected, view: &View) -> Frame {
-        let Reprojected { emission, diffuse, glossy, passes, unserved, buffers } = frame;
+impl<R> WithProbes<'_, R> {
+    fn frame(&self, frame: Reprojected, view: &View) -> Result<Frame> {
+        let Reprojected { emission, diffuse, mut glossy, passes, unserved, buffers } = frame;
+        let mut clock = Clock::start();
+        clock.laps = passes;
+        if let Some(Rays { lit, params, denoiser, seed }) = &self.rays {
+            let shot = Shot { camera: &view.camera, seeds: [*seed, view.frame] };
+            glossy = joined(*lit, shot, &glossy, (params, denoiser.as_ref()), &mut clock)?;
+        }
         let [width, height] = view.camera.size.map(|n| n as usize);
         let inspected = buffers.map(|buffers| with_passes(ExrImage::new(width, height), &buffers, self.supersample));
         let layers = LayerImages { emission, diffuse, glossy };
-        Frame { picture: Picture::Layers(layers), passes, unserved: Some(unserved), counts: Vec::new(), inspected }
+        Ok(Frame {
+            picture: Picture::Layers(layers),
+            passes: clock.laps,
+            unserved: Some(unserved),
+            counts: Vec::new(),
+            inspected,
+        })
     }
 }
 
 fn cpu<'a>(setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let params: GlossyProbeParams = setup.parameters()?;
     let (curvature, probes) = inputs(setup, &params)?;
+    let rays = Rays::of(setup, &params)?;
     let supersample = params.supersample;
     let mut renderer = OnCpu::new(setup.world, curvature, setup.lightmap, params, probes.set.roughness_scale);
     renderer.inspect = setup.inspect;
-    Ok(Box::new(WithProbes { renderer, probes, supersample }))
+    Ok(Box::new(WithProbes { renderer, probes, rays, supersample }))
 }
 
-impl Renderer for WithProbes<OnCpu<'_>> {
+impl Renderer for WithProbes<'_, OnCpu<'_>> {
     fn frame(&mut self, view: &View, _: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
         let frame = self.renderer.frame(&view.camera, &mut self.probes)?;
         progress.advance(view.camera.size[1].into());
-        Ok(WithProbes::frame(self, frame, view))
+        WithProbes::frame(self, frame, view)
     }
 
     fn probe_bytes(&self) -> [u64; 2] {
@@ -119,18 +162,19 @@ impl Renderer for WithProbes<OnCpu<'_>> {
 fn gpu<'a>(gpu: Arc<Gpu>, setup: &Setup<'a>) -> Result<Box<dyn Renderer + 'a>> {
     let params: GlossyProbeParams = setup.parameters()?;
     let (curvature, probes) = inputs(setup, &params)?;
+    let rays = Rays::of(setup, &params)?;
     let (supersample, scale) = (params.supersample, probes.set.roughness_scale);
     let mut renderer = OnGpu::new(gpu, setup.world, curvature, setup.lightmap, params, scale, setup.gpu_memory)?;
     renderer.reserve(View::largest(setup.views), probes.set.size)?;
     renderer.inspect = setup.inspect;
-    Ok(Box::new(WithProbes { renderer, probes, supersample }))
+    Ok(Box::new(WithProbes { renderer, probes, rays, supersample }))
 }
 
-impl Renderer for WithProbes<OnGpu<'_>> {
+impl Renderer for WithProbes<'_, OnGpu<'_>> {
     fn frame(&mut self, view: &View, next: Option<&View>, _: u32, progress: &dyn Progress) -> Result<Frame> {
         let frame = self.renderer.frame(&view.camera, next.map(|v| &v.camera), &mut self.probes)?;
         progress.advance(view.camera.size[1].into());
-        Ok(WithProbes::frame(self, frame, view))
+        WithProbes::frame(self, frame, view)
     }
 
     fn gpu(&self) -> Option<(&str, bool)> {

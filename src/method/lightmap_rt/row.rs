@@ -89,7 +89,7 @@ fn finished(
     let Some(denoiser) = denoise else { return Ok(layers) };
     let [_, guides] = guides(world, &view.camera, denoiser.mirror_alpha(), GUIDE_SAMPLES, seed, view.frame);
     clock.lap("guides");
-    let glossy = denoiser.denoise_layer(&layers.glossy, &guides, view.camera.size[0] as usize)?;
+    let [glossy] = denoiser.denoise_layers([&layers.glossy], &guides, view.camera.size[0] as usize)?;
     clock.lap("denoise");
     Ok(LayerImages { glossy, ..layers })
 }

@@ -42,20 +42,24 @@ impl Parameters for OidnParams {
     }
 }
 
-/// A layer of images `width` pixels wide, without its noise.
+/// Layers of images `width` pixels wide with the same guides, without their noise.
 ///
 /// # Errors
 /// The library is not there, or fails.
-pub fn denoise_layer(layer: &[Rgb], guides: &[Guide], width: usize) -> Result<Vec<Rgb>> {
+pub fn denoise_layers<const N: usize>(layers: [&[Rgb]; N], guides: &[Guide], width: usize) -> Result<[Vec<Rgb>; N]> {
     let oidn = Oidn::found()?;
     let albedo: Vec<Vec3> = guides.iter().map(|g| g.albedo.clamp(Rgb::ZERO, Rgb::ONE)).collect();
     let normal: Vec<Vec3> = guides.iter().map(|g| g.normal).collect();
     // The few rays of the guides leave noise in them, which goes first.
     let albedo = oidn.filtered(&[(c"albedo", &albedo)], &[], width)?;
     let normal = oidn.filtered(&[(c"normal", &normal)], &[], width)?;
-    let images: [(_, &[Vec3]); 3] = [(c"color", layer), (c"albedo", &albedo), (c"normal", &normal)];
-    let clean = oidn.filtered(&images, &[(c"hdr", true), (c"cleanAux", true)], width)?;
     // Where no ray of the guides met a surface that has the layer, there is none to denoise.
     let pixel = |((&noisy, clean), g): ((&Rgb, Rgb), &Guide)| if g.factor == Rgb::ZERO { noisy } else { clean };
-    Ok(layer.iter().zip(clean).zip(guides).map(pixel).collect())
+    let mut all = [const { Vec::new() }; N];
+    for (denoised, layer) in all.iter_mut().zip(layers) {
+        let images: [(_, &[Vec3]); 3] = [(c"color", layer), (c"albedo", &albedo), (c"normal", &normal)];
+        let clean = oidn.filtered(&images, &[(c"hdr", true), (c"cleanAux", true)], width)?;
+        *denoised = layer.iter().zip(clean).zip(guides).map(pixel).collect();
+    }
+    Ok(all)
 }

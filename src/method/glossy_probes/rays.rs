@@ -1,0 +1,261 @@
+//! Rays beside the probes: a few along each pixel's glossy lobe, lit by the light map, joined with what the probes say by how much each is to be
+//! trusted.
+//!
+//! *Ours*. Probes have no noise, and are off where their texels are too coarse for a moulding or where no probe sees what a mirror shows; rays are
+//! right in the mean and noisy, less so with a denoiser. Which of the two is nearer need not be guessed from the gather's energy or the lobe's width: half of the rays
+//! tells it. For an estimate X that this half R has no part in, E[|X - R|²] is the squared error of X and the variance of R, which all estimates share. So, over a
+//! window, w X + (1 - w) P is nearest for w = Σ (X - P)·(R - P) / Σ |X - P|², with X from one half of the rays, P from the probes, and R the other half; and once
+//! more with the halves exchanged. No threshold chooses, so that there is no border to see.
+//!
+//! In: a frame's glossy layer from probes, linear. Out: the same, joined.
+
+use crate::base::clock::Clock;
+use crate::base::math::{Rgb, hash_words, luminance};
+use crate::base::named::within;
+use crate::lightmap::LightMap;
+use crate::material::Surface;
+use crate::scene::Camera;
+use crate::transport::path::{PathParams, scattered};
+use crate::transport::{Sampler, World};
+use crate::view::denoise::guides;
+use crate::view::denoiser::Denoiser;
+use crate::view::gbuffer::{GLOSSY, is_glossy};
+use crate::{Error, Result};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Marks the random numbers of these rays.
+const RAYS: u32 = 0x7261_7973;
+/// Most rays a pixel.
+const MOST_RAYS: u32 = 1 << 12;
+/// Luminance that is added to a pixel's before squares are divided by it, in units of the layer's geometric mean: what is darker counts as if it
+/// were so bright.
+const FLOOR: f32 = 0.2;
+/// What both estimates being as good is worth, in squares of differences relative to their sum.
+const PRIOR: f32 = 0.01;
+
+/// Rays of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RaysParams {
+    /// Rays a pixel; 0 leaves the probes alone. *Paper*: 0.
+    pub per_pixel: u32,
+    /// Rays in a row, the first included.
+    pub bounces: u32,
+    /// Standard deviation of the window in which both are weighed, pixels.
+    pub window: f32,
+}
+
+impl Default for RaysParams {
+    fn default() -> Self {
+        Self { per_pixel: 0, bounces: 3, window: 8.0 }
+    }
+}
+
+impl RaysParams {
+    /// An error where a parameter is out of its range.
+    pub fn validate(&self) -> Result<()> {
+        within("rays.per_pixel", self.per_pixel, 0..=MOST_RAYS)?;
+        if self.per_pixel == 1 {
+            return Err(Error::Request("rays.per_pixel=1: expected 0, or 2 and more: half of them judges the others".into()));
+        }
+        within("rays.bounces", self.bounces, 1..=MOST_RAYS)?;
+        within("rays.window", self.window, 0.5..=256.0)
+    }
+}
+
+/// A camera and its frame's random numbers.
+#[derive(Clone, Copy)]
+pub struct Shot<'a> {
+    /// The camera, at the layer's size.
+    pub camera: &'a Camera,
+    /// Seed and frame number.
+    pub seeds: [u32; 2],
+}
+
+/// The glossy layer of probes, joined with rays.
+///
+/// # Errors
+/// The denoiser's.
+pub fn joined(
+    (world, lightmap): (&World, &LightMap),
+    shot: Shot,
+    probes: &[Rgb],
+    (params, denoiser): (&RaysParams, Option<&Denoiser>),
+    clock: &mut Clock,
+) -> Result<Vec<Rgb>> {
+    let width = shot.camera.size[0] as usize;
+    let halves = halves(world, lightmap, shot, params);
+    let whole: Vec<Rgb> = halves[0].iter().zip(&halves[1]).map(|(a, b)| mean([*a, *b], params.per_pixel)).collect();
+    clock.lap("rays");
+    let estimates = match denoiser {
+        None => [halves[0].clone(), halves[1].clone(), whole],
+        Some(denoiser) => {
+            let [seed, frame] = shot.seeds;
+            let samples = denoiser.guide_samples(params.per_pixel);
+            let [_, guides] = guides(world, shot.camera, denoiser.mirror_alpha(), samples, seed, frame);
+            clock.lap("guides");
+            denoiser.denoise_layers([&halves[0], &halves[1], &whole], &guides, width)?
+        }
+    };
+    clock.lap("denoise");
+    let weights = weights(probes, &halves, &estimates, (width, params.window));
+    let layer = probes.iter().zip(&estimates[2]).zip(weights).map(|((&p, &x), w)| p + (x - p) * w).collect();
+    clock.lap("join");
+    Ok(layer)
+}
+
+/// How many of a pixel's rays are in each half.
+fn counts(rays: u32) -> [u32; 2] {
+    [rays.div_ceil(2), rays / 2]
+}
+
+/// The mean of all rays, from those of the halves.
+fn mean(halves: [Rgb; 2], rays: u32) -> Rgb {
+    let [a, b] = counts(rays).map(|n| n as f32 / rays as f32);
+    halves[0] * a + halves[1] * b
+}
+
+/// Means of the even and of the odd rays of each pixel.
+fn halves(world: &World, lightmap: &LightMap, Shot { camera, seeds: [seed, frame] }: Shot, params: &RaysParams) -> [Vec<Rgb>; 2] {
+    let [width, height] = camera.size;
+    let path = PathParams { max_depth: params.bounces + 1, rr_depth: u32::MAX };
+    let known = |s: &Surface, wo: Vec3| lightmap.diffuse_radiance(&world.scene, s, wo);
+    let pixel = |i: u32| {
+        let corner = Vec2::new((i % width) as f32, (i / width) as f32);
+        let stream = hash_words(&[seed, frame, RAYS, i]);
+        let mut sums = [Rgb::ZERO; 2];
+        for index in 0..params.per_pixel {
+            let mut sampler = Sampler::new(stream, index);
+            let [dx, dy, lens_x, lens_y] = sampler.next_4d();
+            let ray = camera.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y));
+            if let Some(surface) = world.seen(&ray).filter(|s| is_glossy(world, s, -ray.d)) {
+                sums[index as usize % 2] += scattered(world, &surface, -ray.d, GLOSSY, Some(&known), &path, &mut sampler);
+            }
+        }
+        let [a, b] = counts(params.per_pixel).map(|n| 1.0 / n as f32);
+        (sums[0] * a, sums[1] * b)
+    };
+    let (even, odd) = (0..width * height).into_par_iter().with_min_len(width as usize).map(pixel).unzip();
+    [even, odd]
+}
+
+/// What the rays' estimate weighs at each pixel, 0 to 1, by both halves: `estimates` holds that of each half, and of all rays.
+fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 3], (width, window): (usize, f32)) -> Vec<f32> {
+    let lights = || probes.iter().map(|&c| luminance(c)).filter(|&y| y > 0.0);
+    let floor = FLOOR * (lights().map(f32::ln).sum::<f32>() / lights().count().max(1) as f32).exp();
+    let term = |i: usize| {
+        let scale = (luminance(probes[i]) + luminance(estimates[2][i]) + floor).powi(-2);
+        let (mut along, mut square) = (0.0, 0.0);
+        for (estimate, judge) in [(0, 1), (1, 0)] {
+            let apart = estimates[estimate][i] - probes[i];
+            along += apart.dot(halves[judge][i] - probes[i]);
+            square += apart.length_squared();
+        }
+        let term = Vec2::new(along, square) * scale;
+        if term.is_finite() { term } else { Vec2::ZERO }
+    };
+    let terms: Vec<Vec2> = (0..probes.len()).into_par_iter().with_min_len(width.max(1)).map(term).collect();
+    let weight = |sum: Vec2| ((sum.x + 0.5 * PRIOR) / (sum.y + PRIOR)).clamp(0.0, 1.0);
+    blurred(&terms, width, window).into_iter().map(weight).collect()
+}
+
+/// Gaussian sums of an image; what lies outside of it is zero.
+fn blurred(image: &[Vec2], width: usize, sigma: f32) -> Vec<Vec2> {
+    let reach = (3.0 * sigma).ceil() as usize;
+    let mut kernel: Vec<f32> = (0..=2 * reach).map(|k| (-0.5 * ((k as f32 - reach as f32) / sigma).powi(2)).exp()).collect();
+    let total: f32 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|k| *k /= total);
+    let height = image.len() / width.max(1);
+    // Of the pixel `i` the neighbours along an axis on which it is number `at` of `count`, `stride` apart.
+    let pass = |source: &[Vec2], i: usize, [at, count, stride]: [usize; 3]| -> Vec2 {
+        let (first, last) = (at.saturating_sub(reach), (at + reach).min(count - 1));
+        (first..=last).map(|k| source[i + k * stride - at * stride] * kernel[k + reach - at]).sum()
+    };
+    let all = |source: &[Vec2], axis: &(dyn Fn(usize) -> [usize; 3] + Sync)| -> Vec<Vec2> {
+        (0..source.len()).into_par_iter().with_min_len(width.max(1)).map(|i| pass(source, i, axis(i))).collect()
+    };
+    let across = all(image, &|i| [i % width, width, 1]);
+    all(&across, &|i| [i / width, height, width])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: usize = 192;
+    const COUNT: usize = WIDTH * 96;
+    /// Standard deviation of a half's noise.
+    const NOISE: f32 = 0.2;
+
+    fn gaussian(i: usize, half: u32) -> f32 {
+        let uniform = |k: u32| Sampler::new(hash_words(&[i as u32, half, k]), 0).next_4d()[0];
+        (0..12).map(uniform).sum::<f32>() - 6.0
+    }
+
+    /// Probes that are off by `bias` in the left half of an image whose truth is 1, and two halves of noisy rays.
+    fn picture(bias: f32) -> (Vec<Rgb>, [Vec<Rgb>; 2]) {
+        let probes = (0..COUNT).map(|i| Rgb::splat(if i % WIDTH < WIDTH / 2 { 1.0 + bias } else { 1.0 })).collect();
+        let half = |h| (0..COUNT).map(|i| Rgb::splat(1.0 + NOISE * gaussian(i, h))).collect();
+        (probes, [half(0), half(1)])
+    }
+
+    /// Mean weight of both sides, away from their border.
+    fn sides(weights: &[f32]) -> [f32; 2] {
+        let mean = |from: usize| {
+            let inside: Vec<f32> =
+                weights.iter().enumerate().filter(|(i, _)| (from..from + 32).contains(&(i % WIDTH))).map(|(_, w)| *w).collect();
+            inside.iter().sum::<f32>() / inside.len() as f32
+        };
+        [mean(32), mean(128)]
+    }
+
+    #[test]
+    fn noisy_rays_weigh_what_wiener_would_give_them_and_nothing_where_probes_are_right() {
+        let bias = 0.3;
+        let (probes, halves) = picture(bias);
+        let whole: Vec<Rgb> = halves[0].iter().zip(&halves[1]).map(|(a, b)| mean([*a, *b], 2)).collect();
+        let weights = weights(&probes, &halves, &[halves[0].clone(), halves[1].clone(), whole], (WIDTH, 8.0));
+        let [left, right] = sides(&weights);
+        // Each half is an estimate with the noise of a half: b² / (b² + σ²).
+        let wiener = bias * bias / (bias * bias + NOISE * NOISE);
+        assert!((left - wiener).abs() < 0.02, "{left}, not {wiener}");
+        // 200 pixels a window: the weight's own noise is a tenth, cut off below 0.
+        assert!(right < 0.1, "{right}");
+    }
+
+    #[test]
+    fn rays_without_noise_replace_probes_that_are_off_and_equals_are_mixed() {
+        let bias = 0.3;
+        let (probes, halves) = picture(bias);
+        let clean = || vec![Rgb::ONE; COUNT];
+        let [left, right] = sides(&weights(&probes, &halves, &[clean(), clean(), clean()], (WIDTH, 8.0)));
+        // All of it, but for what the prior holds back: squares of three channels and two halves, relative to the sum of both and the floor.
+        let squares = 6.0 * bias * bias / (2.0 + bias + FLOOR * (1.0 + bias).sqrt()).powi(2);
+        let expected = (squares + 0.5 * PRIOR) / (squares + PRIOR);
+        assert!((left - expected).abs() < 0.01 && left > 0.9, "{left}, not {expected}");
+        assert!((right - 0.5).abs() < 1e-3, "{right}");
+    }
+
+    #[test]
+    fn what_is_no_number_does_not_spread() {
+        let (mut probes, halves) = picture(0.3);
+        probes[50 * WIDTH + 50] = Rgb::splat(f32::NAN);
+        let weights = weights(&probes, &halves, &[halves[0].clone(), halves[1].clone(), halves[0].clone()], (WIDTH, 8.0));
+        assert!(weights.iter().all(|w| w.is_finite()));
+    }
+
+    #[test]
+    fn sums_keep_a_constant_inside_and_spread_a_spike_evenly() {
+        let mut image = vec![Vec2::new(3.0, 1.0); COUNT];
+        let sums = blurred(&image, WIDTH, 2.0);
+        assert!(sums[48 * WIDTH + 96].distance(Vec2::new(3.0, 1.0)) < 1e-5);
+        image.fill(Vec2::ZERO);
+        image[48 * WIDTH + 96] = Vec2::ONE;
+        let sums = blurred(&image, WIDTH, 2.0);
+        assert_eq!(sums[48 * WIDTH + 93], sums[48 * WIDTH + 99]);
+        assert_eq!(sums[48 * WIDTH + 93], sums[45 * WIDTH + 96]);
+        assert!((sums.iter().map(|s| s.x).sum::<f32>() - 1.0).abs() < 1e-5);
+    }
+}
