@@ -8,7 +8,7 @@ use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;
 use crate::material::Surface;
 use crate::transport::Sampler;
-use crate::transport::follow::{Follow, PathStart};
+use crate::transport::follow::{Follow, PathStart, PathSum};
 use crate::transport::path::{KnownDiffuse, transmitted_irradiance};
 use rayon::prelude::*;
 
@@ -31,8 +31,26 @@ struct Choice {
 /// Light of a region's samples.
 #[derive(Clone, Copy, Default)]
 struct Sum {
-    light: Rgb,
+    paths: PathSum,
     count: u32,
+}
+
+impl Sum {
+    fn add(&mut self, light: PathSum) {
+        self.paths = self.paths + light;
+        self.count += 1;
+    }
+
+    fn is_lit(&self) -> bool {
+        self.paths.color != Rgb::ZERO
+    }
+
+    /// The samples' mean, and the variance of its luminance as if they were independent: infinite for a single sample.
+    fn mean(&self) -> (Rgb, f32) {
+        let (n, mean) = (f64::from(self.count), self.paths.luminance / f64::from(self.count));
+        let variance = (self.paths.squares / n - mean * mean).max(0.0) / (n - 1.0);
+        (self.paths.color / self.count as f32, if self.count > 1 { variance as f32 } else { f32::INFINITY })
+    }
 }
 
 impl Plan<'_> {
@@ -53,8 +71,7 @@ impl Plan<'_> {
             for (&(_, back), choice) in items.iter().zip(&choices) {
                 let mut sums = vec![Sum::default(); choice.regions.len()];
                 for (&(_, region), light) in choice.samples.iter().zip(&mut lights) {
-                    sums[region as usize].light += light.color;
-                    sums[region as usize].count += 1;
+                    sums[region as usize].add(light);
                 }
                 records.push(self.settle(choice, &sums, back));
             }
@@ -134,11 +151,11 @@ impl Plan<'_> {
     /// The largest region that gets any light, and of those one from which the sensor is seen in two segments, if there is one.
     fn settle(&self, choice: &Choice, sums: &[Sum], back: bool) -> Record {
         let flag = match choice.view {
-            Sight::Inside => return record(Rgb::ZERO, 0),
+            Sight::Inside => return record((Rgb::ZERO, 0.0), 0),
             Sight::Contact => CONTACT,
             Sight::Open => OPEN,
         };
-        let mut lit: Vec<_> = choice.regions.iter().zip(sums).filter(|(_, sum)| sum.light != Rgb::ZERO).collect();
+        let mut lit: Vec<_> = choice.regions.iter().zip(sums).filter(|(_, sum)| sum.is_lit()).collect();
         let split = if lit.len() < sums.len() && !lit.is_empty() { SPLIT } else { 0 };
         if lit.len() > 1 {
             let visibility = self.visibility();
@@ -150,10 +167,10 @@ impl Plan<'_> {
         }
         // The first of equals.
         let chosen = lit.into_iter().rev().max_by_key(|(_, sum)| sum.count);
-        record(chosen.map_or(Rgb::ZERO, |(_, sum)| sum.light / sum.count as f32), flag | split)
+        record(chosen.map_or((Rgb::ZERO, 0.0), |(_, sum)| sum.mean()), flag | split)
     }
 }
 
-fn record(value: Rgb, flags: u32) -> Record {
-    [value.x.to_bits(), value.y.to_bits(), value.z.to_bits(), flags]
+fn record((value, variance): (Rgb, f32), flags: u32) -> Record {
+    [value.x.to_bits(), value.y.to_bits(), value.z.to_bits(), flags, variance.to_bits()]
 }
