@@ -131,9 +131,12 @@ impl Surfaces<'_> {
     }
 
     /// The same light, with the mean variance of a site and of those that it is linked with: that of a few samples is itself noise.
-    /// One of a single sample, infinite, says nothing.
+    /// One of a single sample, infinite, says nothing; a texel that is hidden in part keeps its own.
     fn pooled(&self, light: &[Light]) -> Vec<Light> {
         let of = |i: usize| {
+            if self.sites[i].in_part && light[i].variance.is_finite() {
+                return light[i];
+            }
             let around = std::iter::once(i).chain(self.links.at(i).iter().map(|&j| j as usize));
             let known = around.map(|j| light[j].variance).filter(|v| v.is_finite());
             let (sum, count) = known.fold((0.0, 0.0f32), |(sum, count), v| (sum + v, count + 1.0));
@@ -257,24 +260,31 @@ mod tests {
         (hash_words(&[i as u32, 77]) as f32 / u32::MAX as f32 - 0.5) * 12f32.sqrt()
     }
 
-    #[test]
-    fn noise_on_a_sloping_light_falls_to_what_the_weights_promise() {
-        let n = 48;
+    /// Mean square error and promised variance of the denoised texels of a wall of 96 x 96 whose light slopes.
+    fn on_a_slope(noise_sigma: f32, params: &DenoiseParams) -> (f32, f32) {
+        let n = 96;
         let sites = square(Vec3::ZERO, Vec3::Z, Vec3::X, n);
         let truth = |s: &Site| 2.0 + 0.6 * s.position.x - 0.3 * s.position.z;
+        let light = |(i, s): (usize, &Site)| Light {
+            color: Rgb::splat(truth(s) + noise_sigma * noise(i)),
+            variance: noise_sigma * noise_sigma,
+        };
+        let light: Vec<Light> = sites.iter().enumerate().map(light).collect();
+        let links = link(&sites, TEXEL, &|_, _| true);
+        let clean = Surfaces { sites: &sites, links: &links, texel: TEXEL, params }.denoise(&light, &Silent);
+        let mean = |of: &dyn Fn(usize) -> f32| (0..n * n).map(of).sum::<f32>() / (n * n) as f32;
+        (mean(&|i| (clean[i].color.x - truth(&sites[i])).powi(2)), mean(&|i| clean[i].variance))
+    }
+
+    #[test]
+    fn noise_on_a_sloping_light_falls_to_what_the_weights_promise() {
         let sigma = 0.3;
-        let light: Vec<Light> = sites
-            .iter()
-            .enumerate()
-            .map(|(i, s)| Light { color: Rgb::splat(truth(s) + sigma * noise(i)), variance: sigma * sigma })
-            .collect();
-        let clean = denoise(&sites, &|_, _| true, &light);
-        let count = (n * n) as f32;
-        let square = sites.iter().zip(&clean).map(|(s, c)| (c.color.x - truth(s)).powi(2)).sum::<f32>() / count;
-        let promised = clean.iter().map(|c| c.variance).sum::<f32>() / count;
-        // A sixteenth of the variance and less, borders included; choosing by the light costs a little beside fixed weights.
-        assert!(promised < sigma * sigma / 16.0, "{promised}");
-        assert!((0.8..1.5).contains(&(square / promised)), "{square} in place of {promised}");
+        // Weights that the light has no part in keep their promise, but for chance: some 200 neighbourhoods, 10 %.
+        let (square, promised) = on_a_slope(sigma, &DenoiseParams { sigma: 1e4, ..DenoiseParams::default() });
+        assert!((0.7..1.3).contains(&(square / promised)), "{square} in place of {promised}");
+        // Those that ask the light follow its noise a little: a sixteenth of the variance all the same, borders included.
+        let (square, _) = on_a_slope(sigma, &DenoiseParams::default());
+        assert!(square < sigma * sigma / 16.0, "{square}");
     }
 
     #[test]
