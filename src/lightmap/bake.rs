@@ -6,12 +6,14 @@
 //! of the second read diffuse light from its map, one bounce away, where the mean over many texels hides their noise.
 
 use super::adjacency::adjacency;
+use super::denoise::DenoiseParams;
 use super::parts::Store;
 use super::solid::{Orientation, mark_solids};
 use super::texels::Texels;
 use super::visible::{Visibility, facing};
 use super::{Atlas, AtlasParams, LightMap, fill, lookup, seam};
 use crate::base::math::{Rgb, hash_words};
+use crate::base::named::Parameters;
 use crate::base::progress::Progress;
 use crate::io::jobs::{Done, Shard, complete};
 use crate::material::Surface;
@@ -44,6 +46,8 @@ pub(super) const OPEN: u32 = 1;
 pub(super) const CONTACT: u32 = 2;
 /// A dark part of the texel was left out.
 pub(super) const SPLIT: u32 = 4;
+/// Some of its samples do not count: what is told of the texel holds near one that does.
+pub(super) const PART: u32 = 8;
 
 /// All parameters of a bake but the seed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,11 +61,26 @@ pub struct LightMapParams {
     pub path: PathParams,
     /// Samples a texel of the first pass; 0: there is none, and every path is traced in full.
     pub first_spp: u32,
+    /// How the noise is taken out of the finished texels; `None`: it stays. The map of the first pass keeps its own, so that what the second
+    /// reads has no bias of a filter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoise: Option<DenoiseParams>,
 }
 
 impl Default for LightMapParams {
     fn default() -> Self {
-        Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default(), first_spp: 0 }
+        Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default(), first_spp: 0, denoise: None }
+    }
+}
+
+impl LightMapParams {
+    /// Refuses what cannot be baked.
+    pub fn validate(&self) -> Result<()> {
+        match (self.spp, &self.denoise) {
+            (0, _) => Err(Error::Request("--spp 0: expected at least 1".into())),
+            (1, Some(_)) => Err(Error::Request("--denoise: one sample tells nothing of its noise; give --spp 2 or more".into())),
+            (_, denoise) => denoise.as_ref().map_or(Ok(()), Parameters::validate),
+        }
     }
 }
 
@@ -99,6 +118,8 @@ pub struct Pass<'a> {
     pub(super) known: Option<&'a LightMap>,
     /// Where they are followed; `None` for the CPU.
     device: Option<&'a dyn Follow>,
+    /// How the noise is taken out of the finished texels, if it is.
+    denoise: Option<DenoiseParams>,
 }
 
 impl<'a> Pass<'a> {
@@ -120,9 +141,7 @@ impl<'a> Plan<'a> {
     }
 
     fn of_sides(world: &'a World, params: &LightMapParams, seed: u32, any_light: bool) -> Result<Self> {
-        if params.spp == 0 {
-            return Err(Error::Request("--spp 0: expected at least 1".into()));
-        }
+        params.validate()?;
         let scene = &world.scene;
         let atlas = atlas_of(scene, &params.atlas)?;
         let texels = Texels::new(&scene.geometry, &atlas);
@@ -140,12 +159,12 @@ impl<'a> Plan<'a> {
     /// The pass that traces a few paths in full, for the second to read its map; `None` if the second shall do without.
     pub fn first_pass(&self) -> Option<Pass<'static>> {
         let spp = self.params.first_spp;
-        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None, device: None })
+        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None, device: None, denoise: None })
     }
 
     /// The pass whose map counts; its paths read diffuse light from `known` and are traced in full without it.
     pub fn second_pass<'k>(&self, known: Option<&'k LightMap>) -> Pass<'k> {
-        Pass { spp: self.params.spp, seed: self.seed, known, device: None }
+        Pass { spp: self.params.spp, seed: self.seed, known, device: None, denoise: self.params.denoise }
     }
 
     /// Texel sides to bake.
@@ -209,26 +228,28 @@ impl<'a> Plan<'a> {
         store.has(block, self.block(block).len())
     }
 
-    /// The finished map, ready for lookups.
-    pub fn map(&self, store: &dyn Store) -> Result<LightMap> {
-        let Baked { front, back } = self.assemble(store)?;
+    /// A pass's finished map, ready for lookups.
+    pub fn map(&self, pass: &Pass, store: &dyn Store, progress: &dyn Progress) -> Result<LightMap> {
+        let Baked { front, back } = self.assemble(pass, store, progress)?;
         Ok(lookup::sides(&self.world.scene.geometry, &self.atlas, front, back))
     }
 
-    /// Puts the blocks together: gutters, texels that nobody sees, seams.
-    pub fn assemble(&self, store: &dyn Store) -> Result<Baked> {
-        let mut sides = [Side::new(self), Side::new(self)];
+    /// Puts a pass's blocks together: noise, where it shall go; gutters, texels that nobody sees, seams.
+    pub fn assemble(&self, pass: &Pass, store: &dyn Store, progress: &dyn Progress) -> Result<Baked> {
+        let mut records = Vec::with_capacity(self.items.len());
         for b in 0..self.blocks() {
-            let items = self.block(b);
-            let records = store
-                .get(b, items.len())
-                .ok_or_else(|| Error::Request(format!("block {b} of the light map is missing: bake it again")))?;
-            for (&(texel, back), r) in items.iter().zip(&records) {
-                let side = &mut sides[back as usize];
-                let pixel = self.texels.pixel[texel as usize] as usize;
-                side.pixels[pixel] = Rgb::from_array([r[0], r[1], r[2]].map(f32::from_bits));
-                side.flags[pixel] = r[3];
-            }
+            let block = store.get(b, self.block(b).len());
+            records.extend(block.ok_or_else(|| Error::Request(format!("block {b} of the light map is missing: bake it again")))?);
+        }
+        if let Some(params) = &pass.denoise {
+            self.denoise(pass, &mut records, params, progress);
+        }
+        let mut sides = [Side::new(self), Side::new(self)];
+        for (&(texel, back), r) in self.items.iter().zip(&records) {
+            let side = &mut sides[back as usize];
+            let pixel = self.texels.pixel[texel as usize] as usize;
+            side.pixels[pixel] = Rgb::from_array([r[0], r[1], r[2]].map(f32::from_bits));
+            side.flags[pixel] = r[3];
         }
         let [front, back] = sides;
         let has_back = self.backs() > 0;

@@ -2,7 +2,7 @@
 
 use super::bake::{LightMapParams, Pass, Plan};
 use super::parts::{Memory, Store};
-use super::{AtlasParams, LightMap, testing};
+use super::{AtlasParams, DenoiseParams, LightMap, testing};
 use crate::base::math::Rgb;
 use crate::base::progress::Silent;
 use crate::base::ray::Ray;
@@ -42,7 +42,7 @@ fn bake(world: &World, params: &LightMapParams) -> LightMap {
     let map = |pass: &Pass| {
         let store = Memory::default();
         plan.run(pass, &store, None, &Silent, || Ok(())).unwrap();
-        plan.map(&store).unwrap()
+        plan.map(pass, &store, &Silent).unwrap()
     };
     let first = plan.first_pass().map(|pass| map(&pass));
     map(&plan.second_pass(first.as_ref()))
@@ -278,29 +278,56 @@ fn a_scene_without_surfaces_or_light_gives_an_empty_or_black_map() {
 #[test]
 fn shards_and_threads_and_taking_up_a_killed_bake_change_no_bit() {
     let world = box_on_floor(0.0);
-    let params = params(0.02, 2);
-    let plan = Plan::new(&world, &params, 7).unwrap();
-    assert!(plan.blocks() >= 3, "{} blocks", plan.blocks());
-    let whole = Memory::default();
-    plan.run(&plan.second_pass(None), &whole, None, &Silent, || Ok(())).unwrap();
-    let expected = plan.assemble(&whole).unwrap();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let parts = Memory::default();
-    pool.install(|| {
+    for denoise in [None, Some(DenoiseParams::default())] {
+        let params = LightMapParams { denoise, ..params(0.02, 2) };
         let plan = Plan::new(&world, &params, 7).unwrap();
-        assert!(plan.assemble(&parts).is_err(), "blocks are missing");
-        let run = |shard: Option<&str>| {
-            let shard = shard.map(|s| s.parse().unwrap());
-            plan.run(&plan.second_pass(None), &parts, shard, &Silent, || Ok(())).unwrap()
-        };
-        let (half, rest) = (plan.blocks() as usize / 2, plan.blocks().div_ceil(2) as usize);
-        assert_eq!(run(Some("1/2")), Done { made: half, kept: 0, missing: rest });
-        assert_eq!(run(None), Done { made: rest, kept: half, missing: 0 }, "finished blocks are kept");
-        assert_eq!(plan.assemble(&parts).unwrap(), expected);
-    });
-    assert!(parts.get(0, 1).is_none());
-    let other = Plan::new(&world, &params, 8).unwrap();
-    let store = Memory::default();
-    other.run(&other.second_pass(None), &store, None, &Silent, || Ok(())).unwrap();
-    assert_ne!(other.assemble(&store).unwrap(), expected, "the seed counts");
+        assert!(plan.blocks() >= 3, "{} blocks", plan.blocks());
+        let assemble = |plan: &Plan, store: &Memory| plan.assemble(&plan.second_pass(None), store, &Silent);
+        let whole = Memory::default();
+        plan.run(&plan.second_pass(None), &whole, None, &Silent, || Ok(())).unwrap();
+        let expected = assemble(&plan, &whole).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let parts = Memory::default();
+        pool.install(|| {
+            let plan = Plan::new(&world, &params, 7).unwrap();
+            assert!(assemble(&plan, &parts).is_err(), "blocks are missing");
+            let run = |shard: Option<&str>| {
+                let shard = shard.map(|s| s.parse().unwrap());
+                plan.run(&plan.second_pass(None), &parts, shard, &Silent, || Ok(())).unwrap()
+            };
+            let (half, rest) = (plan.blocks() as usize / 2, plan.blocks().div_ceil(2) as usize);
+            assert_eq!(run(Some("1/2")), Done { made: half, kept: 0, missing: rest });
+            assert_eq!(run(None), Done { made: rest, kept: half, missing: 0 }, "finished blocks are kept");
+            assert_eq!(assemble(&plan, &parts).unwrap(), expected);
+        });
+        assert!(parts.get(0, 1).is_none());
+        let other = Plan::new(&world, &params, 8).unwrap();
+        let store = Memory::default();
+        other.run(&other.second_pass(None), &store, None, &Silent, || Ok(())).unwrap();
+        assert_ne!(assemble(&other, &store).unwrap(), expected, "the seed counts");
+    }
+}
+
+#[test]
+fn the_denoiser_lowers_the_error_of_a_bake_and_keeps_its_mean() {
+    // As many paths and more in the mean: error against a bake of 256 paths, over points of the floor beside a box and of the box.
+    let world = box_on_floor(0.0);
+    let of = |spp, denoise| bake(&world, &LightMapParams { denoise, ..params(0.02, spp) });
+    let reference = of(256, None);
+    let errors = |map: &LightMap| {
+        let count = world.scene.geometry.triangles.len() as u32;
+        let places = (0..count).flat_map(|t| (0..400).map(move |i| (t, Sampler::new(t, i).next_2d())));
+        let (mut square, mut sum, mut all) = (0.0, 0.0, 0.0);
+        for (t, u) in places {
+            let at = if u.x + u.y > 1.0 { Vec2::ONE - u } else { u };
+            let r = reference.lookup(t, at, false).x;
+            let d = map.lookup(t, at, false).x - r;
+            (square, sum, all) = (square + d * d, sum + d, all + r);
+        }
+        (square, sum / all)
+    };
+    let (noisy, clean) = (errors(&of(4, None)), errors(&of(4, Some(DenoiseParams::default()))));
+    assert!(clean.0 < 0.25 * noisy.0, "{clean:?} in place of {noisy:?}");
+    assert!(clean.1.abs() < 0.01, "{clean:?}");
+    assert!(Plan::new(&world, &LightMapParams { denoise: Some(DenoiseParams::default()), ..params(0.1, 1) }, 0).is_err());
 }

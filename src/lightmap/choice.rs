@@ -1,14 +1,14 @@
 //! One texel's value: which samples of it count (see [`crate::lightmap::visible`]), the light at each, and what is made of them.
 
-use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, Pass, Plan, SPLIT};
-use super::parts::Record;
+use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, PART, Pass, Plan, SPLIT};
+use super::parts::{Record, WORDS};
 use super::visible::Sight;
 use crate::Result;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::progress::Progress;
 use crate::material::Surface;
 use crate::transport::Sampler;
-use crate::transport::follow::{Follow, PathStart};
+use crate::transport::follow::{Follow, PathStart, PathSum};
 use crate::transport::path::{KnownDiffuse, transmitted_irradiance};
 use rayon::prelude::*;
 
@@ -22,6 +22,8 @@ const MAX_REGIONS: usize = 4;
 struct Choice {
     /// What they see.
     view: Sight,
+    /// Whether others do not.
+    in_part: bool,
     /// A point of each region that the texel falls into, above which its samples see each other.
     regions: Vec<Surface>,
     /// Number and region of each sample.
@@ -31,8 +33,32 @@ struct Choice {
 /// Light of a region's samples.
 #[derive(Clone, Copy, Default)]
 struct Sum {
-    light: Rgb,
+    paths: PathSum,
     count: u32,
+    /// Number of the first sample.
+    first: u32,
+}
+
+impl Sum {
+    fn add(&mut self, sample: u32, light: PathSum) {
+        if self.count == 0 {
+            self.first = sample;
+        }
+        self.paths = self.paths + light;
+        self.count += 1;
+    }
+
+    fn is_lit(&self) -> bool {
+        self.paths.color != Rgb::ZERO
+    }
+
+    /// The samples' mean, and the variance of its luminance as if they were independent: infinite for a single sample.
+    fn record(&self, flags: u32) -> Record {
+        let (n, mean) = (f64::from(self.count), self.paths.luminance / f64::from(self.count));
+        let variance = (self.paths.squares / n - mean * mean).max(0.0) / (n - 1.0);
+        let [r, g, b] = (self.paths.color / self.count as f32).to_array().map(f32::to_bits);
+        [r, g, b, flags, if self.count > 1 { variance as f32 } else { f32::INFINITY }.to_bits(), self.first]
+    }
 }
 
 impl Plan<'_> {
@@ -52,9 +78,8 @@ impl Plan<'_> {
             let mut lights = device.sums(&starts.concat(), &|_| ())?.into_iter();
             for (&(_, back), choice) in items.iter().zip(&choices) {
                 let mut sums = vec![Sum::default(); choice.regions.len()];
-                for (&(_, region), light) in choice.samples.iter().zip(&mut lights) {
-                    sums[region as usize].light += light.color;
-                    sums[region as usize].count += 1;
+                for (&(sample, region), light) in choice.samples.iter().zip(&mut lights) {
+                    sums[region as usize].add(sample, light);
                 }
                 records.push(self.settle(choice, &sums, back));
             }
@@ -98,14 +123,14 @@ impl Plan<'_> {
         let views: Vec<Sight> = first.iter().map(|(s, sampler)| visibility.view(s, back, &mut sampler.clone())).collect();
         let best = views.iter().max().copied().unwrap_or(Sight::Inside);
         if best == Sight::Inside {
-            return Choice { view: best, regions: Vec::new(), samples: Vec::new() };
+            return Choice { view: best, in_part: false, regions: Vec::new(), samples: Vec::new() };
         }
         let plain = views.iter().all(|&v| v == best)
             && (best == Sight::Contact || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
         if !plain {
             return self.choose_in_part(pass, texel, back, best);
         }
-        Choice { view: best, regions: vec![first[0].0], samples: (0..pass.spp).map(|i| (i, 0)).collect() }
+        Choice { view: best, in_part: false, regions: vec![first[0].0], samples: (0..pass.spp).map(|i| (i, 0)).collect() }
     }
 
     /// The samples of a texel of which some are hidden, or lie in several regions.
@@ -128,18 +153,19 @@ impl Plan<'_> {
                 break;
             }
         }
-        Choice { view: wanted, regions, samples }
+        Choice { view: wanted, in_part: true, regions, samples }
     }
 
     /// The largest region that gets any light, and of those one from which the sensor is seen in two segments, if there is one.
     fn settle(&self, choice: &Choice, sums: &[Sum], back: bool) -> Record {
         let flag = match choice.view {
-            Sight::Inside => return record(Rgb::ZERO, 0),
+            Sight::Inside => return [0; WORDS],
             Sight::Contact => CONTACT,
             Sight::Open => OPEN,
         };
-        let mut lit: Vec<_> = choice.regions.iter().zip(sums).filter(|(_, sum)| sum.light != Rgb::ZERO).collect();
+        let mut lit: Vec<_> = choice.regions.iter().zip(sums).filter(|(_, sum)| sum.is_lit()).collect();
         let split = if lit.len() < sums.len() && !lit.is_empty() { SPLIT } else { 0 };
+        let flags = flag | split | if choice.in_part { PART } else { 0 };
         if lit.len() > 1 {
             let visibility = self.visibility();
             let near: Vec<bool> = lit.iter().map(|(at, _)| visibility.near_sensor(at, back)).collect();
@@ -150,10 +176,7 @@ impl Plan<'_> {
         }
         // The first of equals.
         let chosen = lit.into_iter().rev().max_by_key(|(_, sum)| sum.count);
-        record(chosen.map_or(Rgb::ZERO, |(_, sum)| sum.light / sum.count as f32), flag | split)
+        let dark = || [0, 0, 0, flags, 0, choice.samples.first().map_or(0, |s| s.0)];
+        chosen.map_or_else(dark, |(_, sum)| sum.record(flags))
     }
-}
-
-fn record(value: Rgb, flags: u32) -> Record {
-    [value.x.to_bits(), value.y.to_bits(), value.z.to_bits(), flags]
 }

@@ -7,6 +7,7 @@
 //! - [`texels`]: what part of each texel the surface covers, and sample points on it.
 //! - [`solid`] and [`visible`]: samples inside or behind other geometry.
 //! - [`bake`]: the integral, in blocks that can be kept ([`parts`]) and taken up again.
+//! - [`sites`] and [`denoise`]: which texels lie beside one another on a surface, and the filter that takes the noise out of them.
 //! - [`fill`] and [`seam`]: gutters, texels without a value, and chart borders on smooth surfaces.
 //! - [`receivers`]: points of texels where others than the bake gather light.
 //! - [`lookup`]: the file, and a bilinear lookup for a triangle and its barycentrics.
@@ -20,12 +21,14 @@ pub mod bake;
 mod bake_tests;
 pub mod chart;
 mod choice;
+pub mod denoise;
 pub mod fill;
 pub mod lookup;
 pub mod pack;
 pub mod parts;
 pub mod receivers;
 pub mod seam;
+pub mod sites;
 pub mod solid;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -34,4 +37,5 @@ pub mod visible;
 
 pub use atlas::{Atlas, AtlasParams};
 pub use bake::{Baked, LightMapParams, Plan};
+pub use denoise::DenoiseParams;
 pub use lookup::LightMap;

@@ -6,8 +6,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// A finished texel: three radiometric values and flags, all as bits.
-pub type Record = [u32; 4];
+/// Words of a finished texel.
+pub const WORDS: usize = 6;
+
+/// A finished texel: three radiometric values, flags, the variance of the values' luminance, and the number of a sample that counts, all as bits.
+pub type Record = [u32; WORDS];
 
 /// Keeps finished blocks.
 pub trait Store: Sync {
@@ -80,11 +83,11 @@ impl Store for Folder {
         let bytes = std::fs::read(self.file(block)).ok()?;
         let (key, rest) = bytes.split_first_chunk::<32>()?;
         let (records, hash) = rest.split_last_chunk::<32>()?;
-        if *key != self.key || records.len() != 16 * len || blake3::hash(records) != *hash {
+        if *key != self.key || records.len() != 4 * WORDS * len || blake3::hash(records) != *hash {
             return None;
         }
         let word = |b: &[u8]| u32::from_le_bytes(b.try_into().unwrap_or_default());
-        Some(records.chunks_exact(16).map(|r| std::array::from_fn(|i| word(&r[4 * i..4 * i + 4]))).collect())
+        Some(records.chunks_exact(4 * WORDS).map(|r| std::array::from_fn(|i| word(&r[4 * i..4 * i + 4]))).collect())
     }
 
     fn put(&self, block: u32, records: &[Record]) -> Result<()> {
@@ -104,7 +107,7 @@ mod tests {
     fn only_whole_blocks_of_the_same_bake_come_back() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("lightmap.exr.parts");
-        let records = vec![[1, 2, 3, 4], [5, 6, 7, u32::MAX]];
+        let records = vec![[1, 2, 3, 4, 5, 6], [7, 8, 9, u32::MAX, 10, 11]];
         let store = Folder::new(&path, "a bake");
         store.put(3, &records).unwrap();
         assert_eq!(store.get(3, 2), Some(records));

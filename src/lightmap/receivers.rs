@@ -78,7 +78,7 @@ impl Plan<'_> {
 }
 
 /// The same places in every texel (Roberts' R2 sequence), so that what neighbours gather differs by what they see alone.
-fn place(i: u32) -> Vec2 {
+pub(super) fn place(i: u32) -> Vec2 {
     let n = i as f32 + 0.5;
     Vec2::new((n * 0.754_877_7).fract(), (n * 0.569_840_3).fract())
 }

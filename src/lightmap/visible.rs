@@ -86,14 +86,15 @@ impl Visibility<'_> {
         outwards * d.dot(self.world.scene.geometry.area_normal(hit.triangle)) > 0.0
     }
 
-    /// Whether nothing but their own chart stands between two points, just above the surface.
+    /// Whether nothing but their own charts stands between two points, just above the surface.
     pub fn together(&self, a: &Surface, b: &Surface, back: bool) -> bool {
         let lift = LIFT_TEXELS * self.atlas.texel;
         let (from, to) = (a.p + facing(a, back) * lift, b.p + facing(b, back) * lift);
         let Some(d) = (to - from).try_normalize() else { return true };
         let ray = Ray { t_max: from.distance(to), ..Ray::new(from, d) };
         let chart = |t: u32| self.atlas.triangle_chart[t as usize];
-        self.world.closest(&ray).is_none_or(|hit| chart(hit.triangle) != NONE && chart(hit.triangle) == chart(a.triangle))
+        let own = [chart(a.triangle), chart(b.triangle)];
+        self.world.closest(&ray).is_none_or(|hit| chart(hit.triangle) != NONE && own.contains(&chart(hit.triangle)))
     }
 
     /// Whether some surface seen from `surface` (16 rays) is seen by the sensor too.

@@ -27,7 +27,7 @@ pub fn lightmap(world: &World, params: &LightParams, gpu: Option<(&GpuScene, &Pa
     let run = |pass: &reprobe::lightmap::bake::Pass| {
         let store = Memory::default();
         plan.run(pass, &store, None, &Silent, || Ok(())).unwrap();
-        plan.map(&store).unwrap()
+        plan.map(pass, &store, &Silent).unwrap()
     };
     let first = plan.first_pass().map(|pass| run(&pass.on(gpu.map(|(_, paths)| paths as &dyn Follow))));
     let second = gpu

@@ -12,7 +12,8 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512
-  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512 --shard 0/4")]
+  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512 --shard 0/4
+  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 16 --denoise")]
 pub struct Args {
     /// Mitsuba scene, XML or JSON
     #[arg(value_name = "SCENE")]
@@ -31,6 +32,10 @@ pub struct Args {
     /// Samples a texel of a first pass, from whose map the paths of the second read diffuse light; 0: trace every path in full
     #[arg(long, value_name = "N", default_value_t = LightMapParams::default().first_spp, value_parser = clap::value_parser!(u32).range(0..=1 << 24))]
     first_spp: u32,
+    /// Take the noise out of the finished map, by a filter along the surfaces that keeps what differs by more than the noise;
+    /// the map of a first pass keeps its own. With --shard, the one that completes the blocks does it
+    #[arg(long)]
+    denoise: bool,
     /// Bake blocks I, I+N, I+2N, ... only; the shard that completes them writes the map
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -39,7 +44,7 @@ pub struct Args {
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> BakeLightmap {
-        let Self { scene, output, spp, texel, texels, first_spp, shard } = self;
-        BakeLightmap { scene, output, spp: Some(spp), texel, texels, first_spp: Some(first_spp), shard }
+        let Self { scene, output, spp, texel, texels, first_spp, denoise, shard } = self;
+        BakeLightmap { scene, output, spp: Some(spp), texel, texels, first_spp: Some(first_spp), denoise, shard }
     }
 }

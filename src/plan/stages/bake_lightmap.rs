@@ -6,7 +6,7 @@ use crate::gpu::{GpuScene, Paths};
 use crate::io::jobs::{Done, Shard, is_finished, touch};
 use crate::io::{ExrImage, Provenance};
 use crate::lightmap::parts::Folder;
-use crate::lightmap::{AtlasParams, LightMap, LightMapParams, Plan, lookup};
+use crate::lightmap::{AtlasParams, Baked, DenoiseParams, LightMap, LightMapParams, Plan, lookup};
 use crate::plan::option::stage;
 use crate::plan::{Context, Outcome};
 use crate::transport::World;
@@ -32,6 +32,8 @@ stage! {
         "--texels" texels: Option<u32>,
         /// Edge of a texel, metres, in place of the above.
         "--texel" texel: Option<f32>,
+        /// Take the noise out of the finished texels.
+        "--denoise" denoise: bool,
         /// Bake this shard's blocks only.
         "--shard" shard: Option<Shard>,
         /// The light map to write.
@@ -53,11 +55,13 @@ impl BakeLightmap {
             spp: self.spp.unwrap_or(base.spp),
             first_spp: self.first_spp.unwrap_or(base.first_spp),
             atlas,
+            denoise: self.denoise.then(DenoiseParams::default),
             ..base
         };
         within("--spp", params.spp, 1..=1 << 24)?;
         within("--first-spp", params.first_spp, 0..=1 << 24)?;
         within("--texels", atlas.budget, 1..=1 << 26)?;
+        params.validate()?;
         Ok(params)
     }
 
@@ -95,7 +99,9 @@ impl BakeLightmap {
         let device = device.as_ref().map(|d| d as &dyn Follow);
         let pass = plan.second_pass(first.as_ref()).on(device);
         let done = plan.run(&pass, &store, self.shard, cx.progress(), || {
-            write(&plan, &world, &store, &provenance, &self.output)?;
+            let assemble = || plan.assemble(&pass, &store, cx.progress());
+            write(&plan, &world, &assemble, &provenance, &self.output)?;
+            store.remove()?;
             first_store.remove()
         })?;
         Ok(self.outcome(&plan, &params, done, device.map_or("cpu", Follow::device), [loaded, planned, clock()]))
@@ -112,17 +118,19 @@ impl BakeLightmap {
     ) -> Result<Option<LightMap>> {
         let Some(pass) = plan.first_pass() else { return Ok(None) };
         let device = on_gpu(scene.cloned(), params)?;
-        plan.run(&pass.on(device.as_ref().map(|d| d as &dyn Follow)), store, None, cx.progress(), || Ok(()))?;
-        plan.map(store).map(Some)
+        let pass = pass.on(device.as_ref().map(|d| d as &dyn Follow));
+        plan.run(&pass, store, None, cx.progress(), || Ok(()))?;
+        plan.map(&pass, store, cx.progress()).map(Some)
     }
 
     fn outcome(&self, plan: &Plan, params: &LightMapParams, done: Done, device: &str, times: [f64; 3]) -> Outcome {
         let atlas = &plan.atlas;
         let ([width, height], Done { kept, missing, .. }, [loaded, planned, seconds]) = (atlas.size, done, times);
         let state = done.rest(" blocks");
+        let denoised = if self.denoise && missing == 0 { ", denoised" } else { "" };
         Outcome {
             summary: format!(
-                "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
+                "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples{denoised}, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
                 self.output.display(),
                 atlas.charts.len(),
                 atlas.texel,
@@ -133,7 +141,7 @@ impl BakeLightmap {
             ),
             figures: json!({
                 "size": atlas.size, "charts": atlas.charts.len(), "texel": atlas.texel, "texels": plan.len(), "backs": plan.backs(),
-                "spp": params.spp, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
+                "spp": params.spp, "denoise": self.denoise, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
                 "device": device, "seconds_load": loaded, "seconds_plan": planned, "seconds": seconds,
             }),
             ..Outcome::default()
@@ -152,15 +160,14 @@ fn beside(output: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-/// Puts the blocks together, writes the map and then deletes them.
-fn write(plan: &Plan, world: &World, store: &Folder, provenance: &Provenance, output: &Path) -> Result<()> {
-    let baked = match plan.assemble(store) {
+/// Puts the blocks together and writes the map.
+fn write(plan: &Plan, world: &World, assemble: &dyn Fn() -> Result<Baked>, provenance: &Provenance, output: &Path) -> Result<()> {
+    let baked = match assemble() {
         Ok(baked) => baked,
         // Another shard was faster and has deleted the blocks.
         Err(_) if ExrImage::read(output).is_ok_and(|i| i.provenance.as_ref() == Some(provenance)) => return Ok(()),
         Err(e) => return Err(e),
     };
     let image = lookup::encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone());
-    image.write(output)?;
-    store.remove()
+    image.write(output)
 }

@@ -1,0 +1,153 @@
+//! Sites: the open sides of texels as points of the scene's surfaces, and which of them lie beside one another.
+//!
+//! *Ours*: two sites are linked that are near, face the same way on one surface of one material, and see each other just above
+//! it. Charts and objects play no part: the light of a wall does not change where its texels do. What is linked is asked of the
+//! nearest alone, so that the far side of a thin wall on a floor is reached around its end, if at all.
+
+use super::bake::{OPEN, PART, Pass, Plan};
+use super::parts::Record;
+use super::receivers::place;
+use super::texels::Point;
+use super::visible::Visibility;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Most links of a site: those of a texel in a chart to all around it.
+pub const LINKS: usize = 8;
+
+/// Farthest that linked sites lie apart, texels: a little more than a diagonal.
+const REACH: f32 = 1.6;
+
+/// Farthest that one lies above the other's plane, texels.
+const RISE: f32 = 0.4;
+
+/// Least cosine between their normals (25 degrees).
+const ALIGNED_COS: f32 = 0.9;
+
+/// Most sites of a cell, `REACH` wide, that are considered. Where more than these crowd, texels are far finer than asked for.
+const CROWD: usize = 64;
+
+/// Points that a whole texel's centre is the mean of.
+const PLACES: u32 = 4;
+
+/// A texel side that has samples in the open.
+#[derive(Debug, Clone, Copy)]
+pub struct Site {
+    /// Its number among the bake's texel sides.
+    pub item: u32,
+    /// A point of it.
+    pub point: Point,
+    /// Where its light was gathered: the mean of its place, world.
+    pub position: Vec3,
+    /// Unit shading normal, turned to the side that is meant.
+    pub normal: Vec3,
+    /// Material.
+    pub material: u32,
+    /// Whether a part of the texel is hidden, so that its light may be unlike its neighbours'.
+    pub in_part: bool,
+}
+
+/// The links of each site, nearest first, as indices of sites.
+#[derive(Debug, Clone, Default)]
+pub struct Links {
+    firsts: Vec<u32>,
+    to: Vec<u32>,
+}
+
+impl Links {
+    /// From a list for each site.
+    pub fn of(lists: Vec<Vec<u32>>) -> Self {
+        let mut links = Self { firsts: vec![0], to: Vec::new() };
+        for list in lists {
+            links.to.extend(list);
+            links.firsts.push(links.to.len() as u32);
+        }
+        links
+    }
+
+    /// Those of a site.
+    pub fn at(&self, site: usize) -> &[u32] {
+        &self.to[self.firsts[site] as usize..self.firsts[site + 1] as usize]
+    }
+}
+
+impl Plan<'_> {
+    /// The sites of a pass, in the order of its texel sides.
+    pub(super) fn sites(&self, pass: &Pass, records: &[Record]) -> Vec<Site> {
+        let visibility = self.visibility();
+        let site = |(item, (&(texel, back), record)): (usize, (&(u32, bool), &Record))| {
+            let (texel, side) = (texel as usize, if back { -1.0 } else { 1.0 });
+            let in_part = record[3] & PART != 0;
+            // A texel that is hidden in part and gets no light is a gap that none comes into.
+            if record[3] & OPEN == 0 || in_part && record[..3] == [0; 3] {
+                return None;
+            }
+            let surfaces: Vec<_> = if in_part {
+                vec![self.draw(pass, texel, back, record[5]).0]
+            } else {
+                (0..PLACES).map(|i| visibility.sample(texel, place(i))).collect()
+            };
+            let mean = |of: &dyn Fn(usize) -> Vec3| (0..surfaces.len()).map(of).sum::<Vec3>() / surfaces.len() as f32;
+            let first = &surfaces[0];
+            Some(Site {
+                item: item as u32,
+                point: Point { triangle: first.triangle, barycentric: first.barycentric },
+                position: mean(&|i| surfaces[i].p),
+                normal: mean(&|i| surfaces[i].frame.n).try_normalize().unwrap_or(first.ng) * side,
+                material: first.material,
+                in_part,
+            })
+        };
+        self.items.par_iter().zip(records).enumerate().filter_map(site).collect()
+    }
+
+    /// Which of them lie beside one another.
+    pub(super) fn links(&self, sites: &[Site]) -> Links {
+        let visibility = self.visibility();
+        let is_back = |s: &Site| self.items[s.item as usize].1;
+        link(sites, self.atlas.texel, &|a, b| {
+            let (a, b) = (&sites[a], &sites[b]);
+            is_back(a) == is_back(b) && together(&visibility, a, b, is_back(a))
+        })
+    }
+}
+
+fn together(visibility: &Visibility, a: &Site, b: &Site, back: bool) -> bool {
+    visibility.together(&visibility.surface(a.point), &visibility.surface(b.point), back)
+}
+
+/// Links the nearest of `sites` on texels of `texel` metres that see each other.
+pub(super) fn link(sites: &[Site], texel: f32, see: &(dyn Fn(usize, usize) -> bool + Sync)) -> Links {
+    let reach = REACH * texel;
+    let cell = |p: Vec3| (p / reach).floor().as_ivec3();
+    let mut cells: HashMap<glam::IVec3, Vec<u32>> = HashMap::new();
+    for (i, site) in sites.iter().enumerate() {
+        let crowd = cells.entry(cell(site.position)).or_default();
+        if crowd.len() < CROWD {
+            crowd.push(i as u32);
+        }
+    }
+    let of = |i: usize| {
+        let a = &sites[i];
+        let offset = |k: i32| glam::IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+        let around = (0..27).filter_map(|k| cells.get(&(cell(a.position) + offset(k)))).flatten();
+        let mut near: Vec<(f32, u32)> = around
+            .filter(|&&j| j as usize != i && are_beside(a, &sites[j as usize], texel))
+            .map(|&j| (a.position.distance_squared(sites[j as usize].position), j))
+            .collect();
+        near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        // The same answer for both of a pair.
+        let is_seen = |j: &u32| see(i.min(*j as usize), i.max(*j as usize));
+        near.into_iter().map(|(_, j)| j).filter(is_seen).take(LINKS).collect::<Vec<u32>>()
+    };
+    Links::of((0..sites.len()).into_par_iter().map(of).collect())
+}
+
+fn are_beside(a: &Site, b: &Site, texel: f32) -> bool {
+    let d = b.position - a.position;
+    a.material == b.material
+        && d.length_squared() <= (REACH * texel).powi(2)
+        && a.normal.dot(b.normal) >= ALIGNED_COS
+        && a.normal.dot(d).abs().max(b.normal.dot(d).abs()) <= RISE * texel
+}
