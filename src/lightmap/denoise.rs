@@ -264,7 +264,8 @@ mod tests {
     fn on_a_slope(noise_sigma: f32, params: &DenoiseParams) -> (f32, f32) {
         let n = 96;
         let sites = square(Vec3::ZERO, Vec3::Z, Vec3::X, n);
-        let truth = |s: &Site| 2.0 + 0.6 * s.position.x - 0.3 * s.position.z;
+        // Nowhere near zero, below which no light goes.
+        let truth = |s: &Site| 5.0 + 0.6 * s.position.x - 0.3 * s.position.z;
         let light = |(i, s): (usize, &Site)| Light {
             color: Rgb::splat(truth(s) + noise_sigma * noise(i)),
             variance: noise_sigma * noise_sigma,

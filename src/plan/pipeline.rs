@@ -97,6 +97,8 @@ impl Pipeline {
                 scene: scene(),
                 spp: Some(s.lightmap_spp),
                 first_spp: Some(if s.paper { 0 } else { s.lightmap_first_spp }),
+                // One path tells nothing of its noise.
+                denoise: s.lightmap_denoise && !s.paper && s.lightmap_spp > 1,
                 texels: s.texel.is_none().then_some(s.lightmap_texels),
                 texel: s.texel,
                 output: bakes.lightmap.clone(),

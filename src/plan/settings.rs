@@ -26,6 +26,8 @@ pub struct Settings {
     pub lightmap_spp: u32,
     /// Paths a light map's texel in a first pass; 0 for none.
     pub lightmap_first_spp: u32,
+    /// Whether the noise is taken out of the light map.
+    pub lightmap_denoise: bool,
     /// Texels of the light map.
     pub lightmap_texels: u32,
     /// Edge of a light map's texel, metres, in place of their number.
@@ -52,6 +54,7 @@ impl Preset {
                 spp: 64,
                 lightmap_spp: 64,
                 lightmap_first_spp: 8,
+                lightmap_denoise: true,
                 lightmap_texels: 150_000,
                 texel: None,
                 size: Some(Size([320, 180])),
@@ -77,6 +80,7 @@ impl Preset {
                 spp: 2048,
                 lightmap_spp: 2048,
                 lightmap_first_spp: 0,
+                lightmap_denoise: false,
                 lightmap_texels: 4_000_000,
                 size: (!has_path).then_some(Size([1920, 1080])),
                 supersample: 1,

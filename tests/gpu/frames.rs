@@ -166,6 +166,8 @@ pub fn frames_are_the_cpus(device: &Device) {
         ("fine", "--set gather.probes=1 --supersample 2 --set filter.kernel=ggx --set gather.bilinear=nearest"),
         // Memory for hardly more than one probe of the eight.
         ("small", "--gpu-memory 7M --set gather.albedo_ratio=false --set gather.anchors=3"),
+        // Rays of the host, weighed against the device's colours.
+        ("joined", "--set rays.per_pixel=4 --set rays.window=2"),
     ] {
         let (frames, timings) = baked.both(device, name, &format!("{options} --aov all"));
         for (n, images) in frames.iter().enumerate() {
