@@ -1,6 +1,6 @@
 //! The light map's denoiser: each texel becomes what a plane through the light around it says at its place.
 //!
-//! *Ours*, of known parts. A texel's neighbours are what its links lead to ([`super::sites`]), so that charts do not show and nothing comes
+//! *Ours*, of known parts. A texel's neighbours are what its links lead to ([`super::links`]), so that charts do not show and nothing comes
 //! through a wall. They are weighted by distance, by normal, and by how far their light differs beside the noise that both have, as in a
 //! bilateral filter; the noise is measured, by how each texel's samples vary, as Rousselle et al. 2012 do. The fit is of first order
 //! (Bitterli et al. 2016): light that falls off towards a corner keeps its slope where all neighbours lie on one side. Which light differs
@@ -9,9 +9,7 @@
 //!
 //! In: sites, their links and light. Out: their light. The same bits for any number of threads: a site asks others alone.
 
-use super::bake::{Pass, Plan};
-use super::parts::Record;
-use super::sites::{Links, Site};
+use super::links::{Links, Site};
 use crate::Result;
 use crate::base::math::{Basis, Rgb, luminance};
 use crate::base::named::{Parameters, within};
@@ -71,25 +69,6 @@ pub struct Light {
     pub color: Rgb,
     /// Of its luminance.
     pub variance: f32,
-}
-
-impl Plan<'_> {
-    /// A pass's texel sides without most of their noise. Those pressed against something or inside of it stay as they are.
-    pub(super) fn denoise(&self, pass: &Pass, records: &mut [Record], params: &DenoiseParams, progress: &dyn Progress) {
-        let sites = self.sites(pass, records);
-        let links = self.links(&sites);
-        let light = |s: &Site| {
-            let [r, g, b, _, variance, _] = records[s.item as usize].map(f32::from_bits);
-            Light { color: Rgb::new(r, g, b), variance }
-        };
-        let light: Vec<Light> = sites.iter().map(light).collect();
-        let surface = Surfaces { sites: &sites, links: &links, texel: self.atlas.texel, params };
-        for (site, clean) in sites.iter().zip(surface.denoise(&light, progress)) {
-            let record = &mut records[site.item as usize];
-            record[..3].copy_from_slice(&clean.color.to_array().map(f32::to_bits));
-            record[4] = clean.variance.to_bits();
-        }
-    }
 }
 
 /// Where light is shared, and how.
@@ -234,7 +213,7 @@ mod tests {
     use super::*;
     use crate::base::math::hash_words;
     use crate::base::progress::Silent;
-    use crate::lightmap::sites::link;
+    use crate::lightmap::links::link;
     use crate::lightmap::texels::Point;
     use glam::{Vec2, Vec3};
 

@@ -7,7 +7,8 @@
 //! - [`texels`]: what part of each texel the surface covers, and sample points on it.
 //! - [`solid`] and [`visible`]: samples inside or behind other geometry.
 //! - [`bake`]: the integral, in blocks that can be kept ([`parts`]) and taken up again.
-//! - [`sites`] and [`denoise`]: which texels lie beside one another on a surface, and the filter that takes the noise out of them.
+//! - [`links`] and [`denoise`]: which texels lie beside one another on a surface, and the filter that takes the noise out of them; [`sites`]: those
+//!   of a bake.
 //! - [`fill`] and [`seam`]: gutters, texels without a value, and chart borders on smooth surfaces.
 //! - [`receivers`]: points of texels where others than the bake gather light.
 //! - [`lookup`]: the file, and a bilinear lookup for a triangle and its barycentrics.
@@ -23,6 +24,7 @@ pub mod chart;
 mod choice;
 pub mod denoise;
 pub mod fill;
+pub mod links;
 pub mod lookup;
 pub mod pack;
 pub mod parts;

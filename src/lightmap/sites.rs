@@ -1,80 +1,39 @@
-//! Sites: the open sides of texels as points of the scene's surfaces, and which of them lie beside one another.
-//!
-//! *Ours*: two sites are linked that are near, face the same way on one surface of one material, and see each other just above
-//! it. Charts and objects play no part: the light of a wall does not change where its texels do. What is linked is asked of the
-//! nearest alone, so that the far side of a thin wall on a floor is reached around its end, if at all.
+//! Sites of a bake: the open sides of its texels as points of the scene's surfaces, which of them see one another, and their light without its
+//! noise.
 
 use super::bake::{OPEN, PART, Pass, Plan};
+use super::denoise::{DenoiseParams, Light, Surfaces};
+use super::links::{Links, Site, link};
 use super::parts::Record;
 use super::receivers::place;
 use super::texels::Point;
 use super::visible::Visibility;
+use crate::base::math::Rgb;
+use crate::base::progress::Progress;
 use glam::Vec3;
 use rayon::prelude::*;
-use std::collections::HashMap;
-
-/// Most links of a site: those of a texel in a chart to all around it.
-pub const LINKS: usize = 8;
-
-/// Farthest that linked sites lie apart, texels: a little more than a diagonal.
-const REACH: f32 = 1.6;
-
-/// Farthest that one lies above the other's plane, texels.
-const RISE: f32 = 0.4;
-
-/// Least cosine between their normals (25 degrees).
-const ALIGNED_COS: f32 = 0.9;
-
-/// Most sites of a cell, `REACH` wide, that are considered. Where more than these crowd, texels are far finer than asked for.
-const CROWD: usize = 64;
 
 /// Points that a whole texel's centre is the mean of.
 const PLACES: u32 = 4;
 
-/// A texel side that has samples in the open.
-#[derive(Debug, Clone, Copy)]
-pub struct Site {
-    /// Its number among the bake's texel sides.
-    pub item: u32,
-    /// A point of it.
-    pub point: Point,
-    /// Where its light was gathered: the mean of its place, world.
-    pub position: Vec3,
-    /// Unit shading normal, turned to the side that is meant.
-    pub normal: Vec3,
-    /// Material.
-    pub material: u32,
-    /// Whether a part of the texel is hidden, so that its light may be unlike its neighbours'.
-    pub in_part: bool,
-}
-
-/// The links of each site, nearest first, as indices of sites.
-#[derive(Debug, Clone, Default)]
-pub struct Links {
-    firsts: Vec<u32>,
-    to: Vec<u32>,
-}
-
-impl Links {
-    /// From a list for each site.
-    pub fn of(lists: Vec<Vec<u32>>) -> Self {
-        let mut links = Self { firsts: vec![0], to: Vec::new() };
-        for list in lists {
-            links.to.extend(list);
-            links.firsts.push(links.to.len() as u32);
-        }
-        links
-    }
-
-    /// Those of a site.
-    pub fn at(&self, site: usize) -> &[u32] {
-        &self.to[self.firsts[site] as usize..self.firsts[site + 1] as usize]
-    }
-}
-
 impl Plan<'_> {
+    /// A pass's texel sides without most of their noise. Those pressed against something or inside of it stay as they are.
+    pub(super) fn denoise(&self, pass: &Pass, records: &mut [Record], params: &DenoiseParams, progress: &dyn Progress) {
+        let sites = self.sites(pass, records);
+        let links = self.links(&sites);
+        let light = |s: &Site| {
+            let [r, g, b, _, variance, _] = records[s.item as usize].map(f32::from_bits);
+            Light { color: Rgb::new(r, g, b), variance }
+        };
+        let light: Vec<Light> = sites.iter().map(light).collect();
+        let surface = Surfaces { sites: &sites, links: &links, texel: self.atlas.texel, params };
+        for (site, clean) in sites.iter().zip(surface.denoise(&light, progress)) {
+            records[site.item as usize][..3].copy_from_slice(&clean.color.to_array().map(f32::to_bits));
+        }
+    }
+
     /// The sites of a pass, in the order of its texel sides.
-    pub(super) fn sites(&self, pass: &Pass, records: &[Record]) -> Vec<Site> {
+    fn sites(&self, pass: &Pass, records: &[Record]) -> Vec<Site> {
         let visibility = self.visibility();
         let site = |(item, (&(texel, back), record)): (usize, (&(u32, bool), &Record))| {
             let (texel, side) = (texel as usize, if back { -1.0 } else { 1.0 });
@@ -103,7 +62,7 @@ impl Plan<'_> {
     }
 
     /// Which of them lie beside one another.
-    pub(super) fn links(&self, sites: &[Site]) -> Links {
+    fn links(&self, sites: &[Site]) -> Links {
         let visibility = self.visibility();
         let is_back = |s: &Site| self.items[s.item as usize].1;
         link(sites, self.atlas.texel, &|a, b| {
@@ -115,39 +74,4 @@ impl Plan<'_> {
 
 fn together(visibility: &Visibility, a: &Site, b: &Site, back: bool) -> bool {
     visibility.together(&visibility.surface(a.point), &visibility.surface(b.point), back)
-}
-
-/// Links the nearest of `sites` on texels of `texel` metres that see each other.
-pub(super) fn link(sites: &[Site], texel: f32, see: &(dyn Fn(usize, usize) -> bool + Sync)) -> Links {
-    let reach = REACH * texel;
-    let cell = |p: Vec3| (p / reach).floor().as_ivec3();
-    let mut cells: HashMap<glam::IVec3, Vec<u32>> = HashMap::new();
-    for (i, site) in sites.iter().enumerate() {
-        let crowd = cells.entry(cell(site.position)).or_default();
-        if crowd.len() < CROWD {
-            crowd.push(i as u32);
-        }
-    }
-    let of = |i: usize| {
-        let a = &sites[i];
-        let offset = |k: i32| glam::IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-        let around = (0..27).filter_map(|k| cells.get(&(cell(a.position) + offset(k)))).flatten();
-        let mut near: Vec<(f32, u32)> = around
-            .filter(|&&j| j as usize != i && are_beside(a, &sites[j as usize], texel))
-            .map(|&j| (a.position.distance_squared(sites[j as usize].position), j))
-            .collect();
-        near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        // The same answer for both of a pair.
-        let is_seen = |j: &u32| see(i.min(*j as usize), i.max(*j as usize));
-        near.into_iter().map(|(_, j)| j).filter(is_seen).take(LINKS).collect::<Vec<u32>>()
-    };
-    Links::of((0..sites.len()).into_par_iter().map(of).collect())
-}
-
-fn are_beside(a: &Site, b: &Site, texel: f32) -> bool {
-    let d = b.position - a.position;
-    a.material == b.material
-        && d.length_squared() <= (REACH * texel).powi(2)
-        && a.normal.dot(b.normal) >= ALIGNED_COS
-        && a.normal.dot(d).abs().max(b.normal.dot(d).abs()) <= RISE * texel
 }

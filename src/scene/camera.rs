@@ -103,6 +103,12 @@ impl Camera {
         0.5 * self.size[0] as f32 / (0.5 * self.fov_x).tan()
     }
 
+    /// Ray through the place of pixel number `pixel`, and that of the lens, which four numbers in [0, 1) draw.
+    pub fn drawn_ray(&self, pixel: u32, [dx, dy, lens_x, lens_y]: [f32; 4]) -> Ray {
+        let corner = Vec2::new((pixel % self.size[0]) as f32, (pixel / self.size[0]) as f32);
+        self.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y))
+    }
+
     /// Ray through `pixel` (pixels, (0, 0) the upper left corner of the image) and the point
     /// of the lens that `lens` in [0, 1)² maps to.
     pub fn ray(&self, pixel: Vec2, lens: Vec2) -> Ray {

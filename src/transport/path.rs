@@ -46,6 +46,11 @@ impl PathParams {
     /// Light straight from emitters alone.
     pub const DIRECT: Self = Self { max_depth: 1, rr_depth: u32::MAX };
 
+    /// So many rays in a row: the hit of the last is a vertex, too, and none is left out by chance.
+    pub fn of_rays(rays: u32) -> Self {
+        Self { max_depth: rays + 1, rr_depth: u32::MAX }
+    }
+
     /// What the scene's integrator says, with the defaults for what it does not.
     pub fn of(scene: &Scene) -> Self {
         let default = Self::default();

@@ -116,11 +116,9 @@ pub fn guides(world: &World, camera: &Camera, mirror_alpha: f32, samples: u32, s
     let [width, height] = camera.size;
     let samples = samples.clamp(1, GUIDE_SAMPLES);
     let pixel = |i: u32| {
-        let corner = Vec2::new((i % width) as f32, (i / width) as f32);
         let mut sums = [Guide::default(); 2];
         for index in 0..samples {
-            let [dx, dy, lens_x, lens_y] = Sampler::new(hash_words(&[seed, frame, i]), index).next_4d();
-            let ray = camera.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y));
+            let ray = camera.drawn_ray(i, Sampler::new(hash_words(&[seed, frame, i]), index).next_4d());
             let far = Guide { depth: FAR, ..Guide::default() };
             let both = world.seen(&ray).map_or([far; 2], |s| surface_guides(world, &s, -ray.d, mirror_alpha));
             sums = [sums[0].plus(both[0]), sums[1].plus(both[1])];

@@ -5,7 +5,9 @@
 
 use crate::base::math::Rgb;
 use crate::base::named::{Parameters, apply, words};
-use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, filter_layer};
+use crate::scene::Camera;
+use crate::transport::World;
+use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, filter_layer, guides};
 use crate::view::layers::LayerImages;
 use crate::view::oidn::{self, Oidn, OidnParams};
 use crate::{Error, Result};
@@ -74,6 +76,11 @@ impl Denoiser {
             Self::Filter(_) => spp.clamp(1, GUIDE_SAMPLES),
             Self::Oidn { params, .. } => params.guide_samples,
         }
+    }
+
+    /// Guides of the diffuse and of the glossy layer of a frame of `spp` samples, by its seed and number, on the CPU.
+    pub fn guides(&self, world: &World, camera: &Camera, spp: u32, [seed, frame]: [u32; 2]) -> [Vec<Guide>; 2] {
+        guides(world, camera, self.mirror_alpha(), self.guide_samples(spp), seed, frame)
     }
 
     /// Layers of the same guides without their noise, on the CPU.

@@ -12,15 +12,21 @@ pub fn index(w: u32, h: u32, x: i32, y: i32) -> usize {
     y as usize * w as usize + x.rem_euclid(iw) as usize
 }
 
+/// Weights of a Gaussian at -`reach` to `reach`. Sum to 1.
+pub fn gaussian(reach: i32, sigma: f32) -> Vec<f32> {
+    let mut kernel: Vec<f32> = (-reach..=reach).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
+    let sum: f32 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|k| *k /= sum);
+    kernel
+}
+
 /// Gaussian blur of a lat-long image, `sigma` in texels, the kernel cut at 4 sigma or at the image's height. Sums to 1.
 pub fn blur(w: u32, h: u32, image: &[f32], sigma: f32) -> Vec<f32> {
     let reach = ((4.0 * sigma).ceil() as i32).clamp(0, h as i32);
     if reach == 0 {
         return image.to_vec();
     }
-    let mut kernel: Vec<f32> = (-reach..=reach).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
-    let sum: f32 = kernel.iter().sum();
-    kernel.iter_mut().for_each(|k| *k /= sum);
+    let kernel = gaussian(reach, sigma);
     let pass = |source: &[f32], dx: i32, dy: i32| -> Vec<f32> {
         let mut out = Vec::with_capacity(source.len());
         for y in 0..h as i32 {

@@ -9,6 +9,7 @@
 //!
 //! In: a frame's glossy layer from probes, linear. Out: the same, joined.
 
+use super::lattice::gaussian;
 use crate::base::clock::Clock;
 use crate::base::math::{Rgb, hash_words, luminance};
 use crate::base::named::within;
@@ -17,7 +18,6 @@ use crate::material::Surface;
 use crate::scene::Camera;
 use crate::transport::path::{PathParams, scattered};
 use crate::transport::{Sampler, World};
-use crate::view::denoise::guides;
 use crate::view::denoiser::Denoiser;
 use crate::view::gbuffer::{GLOSSY, is_glossy};
 use crate::{Error, Result};
@@ -92,14 +92,13 @@ pub fn joined(
     let estimates = match denoiser {
         None => [halves[0].clone(), halves[1].clone(), whole],
         Some(denoiser) => {
-            let [seed, frame] = shot.seeds;
-            let samples = denoiser.guide_samples(params.per_pixel);
-            let [_, guides] = guides(world, shot.camera, denoiser.mirror_alpha(), samples, seed, frame);
+            let [_, guides] = denoiser.guides(world, shot.camera, params.per_pixel, shot.seeds);
             clock.lap("guides");
-            denoiser.denoise_layers([&halves[0], &halves[1], &whole], &guides, width)?
+            let denoised = denoiser.denoise_layers([&halves[0], &halves[1], &whole], &guides, width)?;
+            clock.lap("denoise");
+            denoised
         }
     };
-    clock.lap("denoise");
     let weights = weights(probes, &halves, &estimates, (width, params.window));
     let layer = probes.iter().zip(&estimates[2]).zip(weights).map(|((&p, &x), w)| p + (x - p) * w).collect();
     clock.lap("join");
@@ -120,16 +119,14 @@ fn mean(halves: [Rgb; 2], rays: u32) -> Rgb {
 /// Means of the even and of the odd rays of each pixel.
 fn halves(world: &World, lightmap: &LightMap, Shot { camera, seeds: [seed, frame] }: Shot, params: &RaysParams) -> [Vec<Rgb>; 2] {
     let [width, height] = camera.size;
-    let path = PathParams { max_depth: params.bounces + 1, rr_depth: u32::MAX };
+    let path = PathParams::of_rays(params.bounces);
     let known = |s: &Surface, wo: Vec3| lightmap.diffuse_radiance(&world.scene, s, wo);
     let pixel = |i: u32| {
-        let corner = Vec2::new((i % width) as f32, (i / width) as f32);
         let stream = hash_words(&[seed, frame, RAYS, i]);
         let mut sums = [Rgb::ZERO; 2];
         for index in 0..params.per_pixel {
             let mut sampler = Sampler::new(stream, index);
-            let [dx, dy, lens_x, lens_y] = sampler.next_4d();
-            let ray = camera.ray(corner + Vec2::new(dx, dy), Vec2::new(lens_x, lens_y));
+            let ray = camera.drawn_ray(i, sampler.next_4d());
             if let Some(surface) = world.seen(&ray).filter(|s| is_glossy(world, s, -ray.d)) {
                 sums[index as usize % 2] += scattered(world, &surface, -ray.d, GLOSSY, Some(&known), &path, &mut sampler);
             }
@@ -164,9 +161,7 @@ fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 3], (w
 /// Gaussian sums of an image; what lies outside of it is zero.
 fn blurred(image: &[Vec2], width: usize, sigma: f32) -> Vec<Vec2> {
     let reach = (3.0 * sigma).ceil() as usize;
-    let mut kernel: Vec<f32> = (0..=2 * reach).map(|k| (-0.5 * ((k as f32 - reach as f32) / sigma).powi(2)).exp()).collect();
-    let total: f32 = kernel.iter().sum();
-    kernel.iter_mut().for_each(|k| *k /= total);
+    let kernel = gaussian(reach as i32, sigma);
     let height = image.len() / width.max(1);
     // Of the pixel `i` the neighbours along an axis on which it is number `at` of `count`, `stride` apart.
     let pass = |source: &[Vec2], i: usize, [at, count, stride]: [usize; 3]| -> Vec2 {

@@ -56,7 +56,7 @@ impl Default for LightmapRtParams {
 impl LightmapRtParams {
     /// The rays as a path: their last hit is a vertex, too.
     pub(crate) fn path(&self) -> PathParams {
-        PathParams { max_depth: self.bounces.min(MOST_BOUNCES) + 1, rr_depth: u32::MAX }
+        PathParams::of_rays(self.bounces.min(MOST_BOUNCES))
     }
 }
 

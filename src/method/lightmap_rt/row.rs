@@ -12,7 +12,7 @@ use crate::method::{Frame, Method, Need, Options, Reads, Renderer, Samples, Setu
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
-use crate::view::denoise::{GUIDE_SAMPLES, guides};
+use crate::view::denoise::GUIDE_SAMPLES;
 use crate::view::denoiser::Denoiser;
 use crate::view::layers::LayerImages;
 use serde_json::Value;
@@ -87,7 +87,7 @@ fn finished(
     clock: &mut Clock,
 ) -> Result<LayerImages> {
     let Some(denoiser) = denoise else { return Ok(layers) };
-    let [_, guides] = guides(world, &view.camera, denoiser.mirror_alpha(), GUIDE_SAMPLES, seed, view.frame);
+    let [_, guides] = denoiser.guides(world, &view.camera, GUIDE_SAMPLES, [seed, view.frame]);
     clock.lap("guides");
     let [glossy] = denoiser.denoise_layers([&layers.glossy], &guides, view.camera.size[0] as usize)?;
     clock.lap("denoise");

@@ -20,7 +20,7 @@ use crate::method::{Frame, Method, Options, Reads, Renderer, Setup, as_given};
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
-use crate::view::denoise::{GUIDE_SAMPLES, guides};
+use crate::view::denoise::GUIDE_SAMPLES;
 use crate::view::denoiser::Denoiser;
 use crate::view::direct::{GLOSSY_BRANCH, direct};
 use crate::view::gbuffer::{GBuffer, GLOSSY};
@@ -172,7 +172,7 @@ fn finished(
     clock: &mut Clock,
 ) -> Result<LayerImages> {
     let Some(denoiser) = &params.denoise else { return Ok(layers) };
-    let guides = guides(world, &view.camera, denoiser.mirror_alpha(), GUIDE_SAMPLES, seed, view.frame);
+    let guides = denoiser.guides(world, &view.camera, GUIDE_SAMPLES, [seed, view.frame]);
     clock.lap("guides");
     let layers = denoiser.denoise(&layers, &guides, view.camera.size[0] as usize)?;
     clock.lap("denoise");

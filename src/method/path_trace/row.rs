@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::scene::film::Filter;
 use crate::transport::path::PathParams;
 use crate::view::View;
-use crate::view::denoise::{DenoiseParams, guides};
+use crate::view::denoise::DenoiseParams;
 use crate::view::denoiser::Denoiser;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -136,7 +136,7 @@ impl Renderer for OnCpu<'_> {
         let mut layers = path_trace(world, camera, &params, seed, *frame, progress);
         clock.lap("path_trace");
         if let Some(d) = &self.params.denoise {
-            let guides = guides(world, camera, d.mirror_alpha(), d.guide_samples(spp), seed, *frame);
+            let guides = d.guides(world, camera, spp, [seed, *frame]);
             clock.lap("guides");
             layers = d.denoise(&layers, &guides, camera.size[0] as usize)?;
             clock.lap("denoise");
