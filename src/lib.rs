@@ -15,6 +15,7 @@
 
 pub mod base;
 pub mod exchange;
+pub mod export;
 pub mod gpu;
 pub mod io;
 pub mod lightmap;

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Rooms of the library from the ground up: each may look into those before it.
-const FLOORS: [&str; 14] = [
+const FLOORS: [&str; 15] = [
     "base",
     "io",
     "material",
@@ -20,6 +20,7 @@ const FLOORS: [&str; 14] = [
     "gpu",
     "method",
     "metric",
+    "export",
     "plan",
 ];
 /// Rooms that know no method, whatever stands above them.

@@ -24,11 +24,11 @@ pub enum Error {
         message: String,
     },
     /// A file asks for something that this program does not have.
-    #[error("{}:{line}: {message}", path.display())]
+    #[error("{}{}: {message}", path.display(), if *line > 0 { format!(":{line}") } else { String::new() })]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// Its line, 1-based.
+        /// Its line, 1-based; 0 where the format has no lines.
         line: u32,
         /// What was found, and what there is.
         message: String,

@@ -1,7 +1,37 @@
 //! Files that scenes come in, read into [`crate::scene`]'s types.
 
 pub mod animation;
+mod finish;
+pub mod gltf;
 pub mod mesh;
 pub mod mitsuba;
 
-pub use mitsuba::load::{LoadOptions, load};
+use crate::Result;
+use crate::scene::Scene;
+use std::path::Path;
+
+/// What the command line says about loading.
+#[derive(Debug, Clone, Default)]
+pub struct LoadOptions {
+    /// Multiplies all lengths (`--unit-scale`); `None` chooses what [`crate::scene::units::metric`] says.
+    pub unit_scale: Option<f32>,
+    /// Values for the scene's `$name` parameters, over its `default`s.
+    pub defines: Vec<(String, String)>,
+    /// Leave out, with a warning, what is not supported (`--skip-unsupported`).
+    pub skip_unsupported: bool,
+    /// Take images whose files end early, with a warning (`--allow-truncated`).
+    pub allow_truncated: bool,
+}
+
+/// Loads a scene: Mitsuba XML, Mitsuba's dictionary form as JSON, or glTF, as the file's name says.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    match is_gltf(path) {
+        true => gltf::load(path, options),
+        false => mitsuba::load::load(path, options),
+    }
+}
+
+/// Whether a file's name is that of a glTF scene.
+pub fn is_gltf(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
+}

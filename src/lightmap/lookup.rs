@@ -64,6 +64,13 @@ impl LightMap {
         bilinear(p, self.size).map_or(Rgb::ZERO, |taps| taps.iter().map(|&(i, w)| pixels[i] * w).sum())
     }
 
+    /// Places of a triangle's corners in the picture, in [0, 1]² from its upper left corner; `None` for triangles without light.
+    pub fn places(&self, triangle: u32) -> Option<[Vec2; 3]> {
+        let corners = self.corners.get(triangle as usize).filter(|corners| !corners[0].is_nan())?;
+        let size = Vec2::new(self.size[0] as f32, self.size[1] as f32);
+        Some(corners.map(|corner| corner / size))
+    }
+
     /// L(S|D)*DE: what the diffuse lobe at `surface` sends towards `wo` (unit, world, away from it).
     pub fn diffuse_radiance(&self, scene: &Scene, surface: &Surface, wo: Vec3) -> Rgb {
         let wi = surface.frame.to_local(wo);

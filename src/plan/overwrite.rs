@@ -1,5 +1,6 @@
 //! Outputs that would destroy something: an input of the same command, or a file that no stage wrote.
 
+use crate::export::gltf;
 use crate::io::{ExrImage, HEAD, is_sealed, picture};
 use crate::{Error, Result};
 use std::fs::File;
@@ -33,6 +34,7 @@ fn is_foreign(path: &Path) -> Result<bool> {
             let bytes = std::fs::read(path).map_err(fail)?;
             serde_json::from_slice::<serde_json::Value>(&bytes).is_ok_and(|value| value.get("provenance").is_none())
         }
+        start if start.starts_with(b"glTF") => !gltf::is_ours(start),
         start if start.starts_with(&EXR) => ExrImage::read_provenance(path).is_ok_and(|found| found.is_none()),
         _ => true,
     })

@@ -1,8 +1,8 @@
 //! A stage of a pipeline: one of the subcommands that read files and write files.
 
 use super::stages::{
-    BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
-    PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
+    BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, ExportGltf, ExportProbes, InspectLightfield,
+    InspectTransport, PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
 };
 use super::{Context, Outcome, overwrite};
 use crate::Result;
@@ -35,6 +35,10 @@ pub enum Stage {
     RenderPath(RenderPath),
     /// `compare`
     Compare(Compare),
+    /// `export-gltf`
+    ExportGltf(ExportGltf),
+    /// `export-probes`
+    ExportProbes(ExportProbes),
     /// `inspect-lightfield`
     InspectLightfield(InspectLightfield),
     /// `inspect-transport`
@@ -68,6 +72,8 @@ macro_rules! with {
             Stage::Relight($s) => $what,
             Stage::RenderPath($s) => $what,
             Stage::Compare($s) => $what,
+            Stage::ExportGltf($s) => $what,
+            Stage::ExportProbes($s) => $what,
             Stage::InspectLightfield($s) => $what,
             Stage::InspectTransport($s) => $what,
         }
@@ -93,6 +99,8 @@ from!(
     BakeTransport,
     RenderPath,
     Compare,
+    ExportGltf,
+    ExportProbes,
     InspectLightfield,
     InspectTransport
 );
@@ -115,6 +123,8 @@ impl Stage {
             Self::Relight(s) => of(s, Relight::COMMAND),
             Self::RenderPath(s) => of(s, RenderPath::COMMAND),
             Self::Compare(s) => of(s, Compare::COMMAND),
+            Self::ExportGltf(s) => of(s, ExportGltf::COMMAND),
+            Self::ExportProbes(s) => of(s, ExportProbes::COMMAND),
             Self::InspectLightfield(s) => of(s, InspectLightfield::COMMAND),
             Self::InspectTransport(s) => of(s, InspectTransport::COMMAND),
         }
@@ -144,6 +154,8 @@ impl Stage {
             Self::BakeLightfield(s) => vec![&s.probes],
             Self::BakeTransport(s) => vec![&s.probes],
             Self::Relight(s) => vec![&s.probes],
+            Self::ExportGltf(s) => s.lightmap.iter().collect(),
+            Self::ExportProbes(s) => vec![&s.lightfield],
             Self::InspectLightfield(s) => vec![&s.probes],
             Self::InspectTransport(s) => vec![&s.probes],
             Self::Qhmap(s) => vec![&s.resmap],
@@ -160,6 +172,7 @@ impl Stage {
             Self::Resmap(s) => vec![&s.scene],
             Self::Curvature(s) => vec![&s.scene],
             Self::BakeLightmap(s) => vec![&s.scene],
+            Self::ExportGltf(s) => vec![&s.scene],
             Self::BakeLightfield(s) => vec![&s.scene],
             Self::BakeTransport(s) => vec![&s.scene],
             Self::Relight(s) => [&s.scene].into_iter().chain(&s.lights).collect(),
@@ -167,7 +180,7 @@ impl Stage {
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),
             Self::InspectTransport(s) => [&s.scene].into_iter().chain(&s.path).collect(),
-            Self::Qhmap(_) => vec![],
+            Self::Qhmap(_) | Self::ExportProbes(_) => vec![],
             Self::Compare(s) => s.second_reference.iter().collect(),
         }
     }
@@ -188,7 +201,7 @@ impl Stage {
     }
 
     fn reads_scene(&self) -> bool {
-        !matches!(self, Self::Qhmap(_) | Self::Compare(_))
+        !matches!(self, Self::Qhmap(_) | Self::Compare(_) | Self::ExportProbes(_))
     }
 
     /// The command and its arguments, as the program takes them.

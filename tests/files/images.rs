@@ -57,7 +57,7 @@ fn a_jpeg_that_ends_early_is_taken_when_asked_for() {
     let options = LoadOptions { allow_truncated: true, ..LoadOptions::default() };
     let scene = folder.load_with(body, &options).unwrap();
     assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("a.jpg"), "{:?}", scene.warnings);
-    let (cut, _) = read(&folder.path("a.jpg"), ReadOptions { allow_truncated: true, raw: false }).unwrap();
+    let (cut, _) = read(&folder.path("a.jpg"), ReadOptions { allow_truncated: true, ..ReadOptions::default() }).unwrap();
     assert_eq!(cut.pixel(5, 2), before.pixel(5, 2), "the first rows are as they were");
     // What follows the end marker, and a thumbnail's own marker before it, change nothing.
     let mut padded = bytes.clone();

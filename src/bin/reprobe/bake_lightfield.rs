@@ -16,7 +16,7 @@ use std::path::PathBuf;
   reprobe bake-lightfield room/scene.xml --probes probes.json -o lightfield/ --size 256 --spp 32 --bounces 4
   reprobe render-path room/scene.xml --path room/path.json --method light-field-probes --probes lightfield/ -o frames/")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The probes, from place-probes

@@ -15,7 +15,7 @@ use std::path::PathBuf;
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512 --shard 0/4
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 16 --denoise")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The light map to write

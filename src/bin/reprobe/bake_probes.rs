@@ -19,7 +19,7 @@ use std::path::PathBuf;
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 128 \\
       --for-path path.json --curvature curvature.exr --size 480x270 --supersample 2")]
 pub struct Args {
-    /// Mitsuba XML or JSON scene
+    /// Scene: Mitsuba XML or JSON, or glTF
     scene: PathBuf,
     /// Probe positions, from place-probes
     #[arg(long, value_name = "FILE")]

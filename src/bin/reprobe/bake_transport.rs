@@ -20,7 +20,7 @@ use std::path::PathBuf;
   reprobe bake-transport room/scene.xml --probes probes.json -o transport/ --volume 0.5
   reprobe render-path room/scene.xml --path room/path.json --method radiance-probes --probes transport/ -o frames/")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The probes, from place-probes

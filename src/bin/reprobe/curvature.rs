@@ -12,7 +12,7 @@ use std::path::PathBuf;
   reprobe curvature room/scene.xml -o curvature.exr
   reprobe info curvature.exr --pictures look/")]
 pub struct Args {
-    /// Mitsuba scene (XML or JSON)
+    /// Scene: Mitsuba XML or JSON, or glTF
     scene: PathBuf,
     /// The table to write
     #[arg(short, long, value_name = "FILE.exr")]

@@ -32,7 +32,7 @@ pub enum Ablations {
       --variant rt=lightmap-rt,--match-time=report/frames/glossy-probes
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --variant lat-long=glossy-probes,qhmap:--lat-long")]
 pub struct Args {
-    /// Mitsuba XML or JSON scene
+    /// Scene: Mitsuba XML or JSON, or glTF
     scene: PathBuf,
     /// Camera path
     #[arg(long, value_name = "PATH.json")]

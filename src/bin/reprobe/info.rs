@@ -1,6 +1,7 @@
 //! `reprobe info`.
 
 use anyhow::{Context as _, ensure};
+use reprobe::exchange::is_gltf;
 use reprobe::io::picture::pictures;
 use reprobe::io::{ExrImage, Samples, atomic, read_text};
 use reprobe::plan::stages::frame_names;
@@ -55,7 +56,7 @@ fn of(file: &Path, args: &Args, cx: &Context) -> anyhow::Result<Said> {
     if file.is_dir() {
         return folder(file);
     }
-    if has_ending(file, "xml") {
+    if has_ending(file, "xml") || is_gltf(file) {
         return scene(file, cx);
     }
     if has_ending(file, "json") {

@@ -26,7 +26,7 @@ use std::path::PathBuf;
   reprobe inspect-lightfield room/scene.xml --probes lightfield/ --pixel 200,100 --trace two-scale -o way.png --json
   reprobe inspect-lightfield room/scene.xml --probes lightfield/ --path room/path.json --frame 3 --hits -o hits.png")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The probes, from bake-lightfield

@@ -13,7 +13,7 @@ use std::path::PathBuf;
   reprobe inspect-transport room/scene.xml --probes transport/ --path room/path.json --frame 3 --receivers 20000 -o lost.png
   reprobe place-probes room/scene.xml --method voxel --count 60 --refine-by transport/ -o better.json")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The operator, from bake-transport

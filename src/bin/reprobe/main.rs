@@ -10,6 +10,8 @@ mod compare;
 mod curvature;
 mod devices;
 mod evaluate;
+mod export_gltf;
+mod export_probes;
 mod info;
 mod inspect_lightfield;
 mod inspect_transport;
@@ -65,6 +67,8 @@ enum Command {
     Relight(relight::Args),
     RenderPath(render_path::Args),
     Compare(compare::Args),
+    ExportGltf(export_gltf::Args),
+    ExportProbes(export_probes::Args),
     InspectLightfield(inspect_lightfield::Args),
     InspectTransport(inspect_transport::Args),
     Devices(devices::Args),
@@ -139,6 +143,8 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::Relight(args) => args.stage().into(),
         Command::RenderPath(args) => args.stage().into(),
         Command::Compare(args) => args.stage().into(),
+        Command::ExportGltf(args) => args.stage().into(),
+        Command::ExportProbes(args) => args.stage().into(),
         Command::InspectLightfield(args) => args.stage().into(),
         Command::InspectTransport(args) => args.stage().into(),
         Command::Devices(args) => return devices::run(&args),
@@ -159,8 +165,8 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
 mod tests {
     use super::*;
     use reprobe::plan::stages::{
-        BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
-        PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
+        BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, ExportGltf, ExportProbes, InspectLightfield,
+        InspectTransport, PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
     };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -179,6 +185,8 @@ mod tests {
             (Relight::COMMAND, Relight::OPTIONS),
             (RenderPath::COMMAND, RenderPath::OPTIONS),
             (Compare::COMMAND, Compare::OPTIONS),
+            (ExportGltf::COMMAND, ExportGltf::OPTIONS),
+            (ExportProbes::COMMAND, ExportProbes::OPTIONS),
             (InspectLightfield::COMMAND, InspectLightfield::OPTIONS),
             (InspectTransport::COMMAND, InspectTransport::OPTIONS),
         ] {

@@ -27,7 +27,7 @@ use std::path::PathBuf;
   reprobe place-probes room/scene.xml -o probes.json --method voxel --spacing 0.7 --path room/path.json --picture plan.png
   reprobe place-probes room/scene.xml -o probes.json --path room/path.json --grid 4x3x4 --coverage-picture coverage.png")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The file to write

@@ -14,7 +14,7 @@ use std::path::PathBuf;
   reprobe relight room/scene.xml --probes transport/ --set bounces=8 --set map_samples=64 -o lightmaps/
   reprobe render-path room/scene.xml --path room/path.json --method lightmap-rt --lightmap lightmaps/0000.exr -o frames/")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The operator, from bake-transport

@@ -28,7 +28,7 @@ A lamp that is carried through a darkened room for two seconds, as lights.json s
       {\"time\": 0, \"position\": [1, 1.5, 1]}, {\"time\": 2, \"position\": [4, 1.5, 2]}]}]}
 Without --path, or with a path of one frame, that camera stays for all frames of the file.")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Camera path [default: one frame from the scene's own sensor]

@@ -14,7 +14,7 @@ use std::path::PathBuf;
   reprobe resmap room/scene.xml --probes probes.json -o resmap/
   reprobe resmap room/scene.xml --probes probes.json -o resmap/ --size 128x64")]
 pub struct Args {
-    /// Mitsuba scene, XML or JSON
+    /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Where the probes stand, from place-probes

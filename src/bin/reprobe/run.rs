@@ -24,7 +24,7 @@ use std::path::PathBuf;
   reprobe run bathroom/scene.xml --path bathroom.json -o out/ --preset medium --reference mitsuba/
   reprobe run bathroom/scene.xml --path bathroom.json -o out/ --preset paper --dry-run")]
 pub struct Args {
-    /// Mitsuba XML or JSON scene
+    /// Scene: Mitsuba XML or JSON, or glTF
     scene: PathBuf,
     /// Camera path [default: the scene's sensor is the one frame]
     #[arg(long, value_name = "PATH.json")]

@@ -152,7 +152,8 @@ fn read(file: &Path, what: Use, allow_truncated: bool) -> Result<(Content, Vec<S
         Use::Ply => mesh(ply::load(file)?),
         Use::Serialized(index) => mesh(serialized::load(file, index as usize)?),
         Use::Image { raw } => {
-            let (image, odd) = image::read(file, image::ReadOptions { raw, allow_truncated })?;
+            let take = if raw { image::Take::Linear } else { image::Take::Color };
+            let (image, odd) = image::read(file, image::ReadOptions { take, allow_truncated })?;
             (Content::Image(Arc::new(image)), odd)
         }
     })

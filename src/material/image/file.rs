@@ -14,24 +14,45 @@ const MAX_SIDE: u32 = 32_768;
 /// Most memory that decoding an image may take, bytes.
 const MAX_BYTES: u64 = 2 << 30;
 
+/// What of an image is taken.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Take {
+    /// Colours; integers are sRGB-encoded.
+    #[default]
+    Color,
+    /// Colours; integers are linear.
+    Linear,
+    /// One of red, green, blue and alpha (0 to 3) as grey; integers are linear. Alpha is 1 where the file has none.
+    Channel(u8),
+}
+
 /// How an image is to be taken.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ReadOptions {
-    /// Integers are linear.
-    pub raw: bool,
+    /// What of it.
+    pub take: Take,
     /// A file that ends early is taken as far as it goes.
     pub allow_truncated: bool,
 }
 
-/// Reads a file, and tells what was odd about it. Integer pixels are sRGB-encoded unless `raw`; floats are linear already, those of an
+/// Reads a file, and tells what was odd about it. Integer pixels are what [`Take`] says; floats are linear already, those of an
 /// EXR file turned into Rec.709.
 pub fn read(path: &Path, options: ReadOptions) -> Result<(Image, Vec<String>)> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    decode(path, &bytes, options)
+}
+
+/// [`read`], of a file that is in memory; messages call it `path`.
+pub fn decode(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<(Image, Vec<String>)> {
     let mut odd = Vec::new();
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
+    let channel = |image: Image| match options.take {
+        Take::Channel(channel) => image.channel(channel),
+        Take::Color | Take::Linear => image,
+    };
     let mut image = match bytes.first_chunk() {
-        _ if is_exr => read_exr(path, &bytes, &mut odd)?,
-        Some(b"PF" | b"Pf") => read_pfm(&bytes).map_err(|message| Error::input(path, message))?,
+        _ if is_exr => channel(read_exr(path, bytes, &mut odd)?),
+        Some(b"PF" | b"Pf") => channel(read_pfm(bytes).map_err(|message| Error::input(path, message))?),
         _ => read_other(path, bytes, options, &mut odd)?,
     };
     if let Pixels::Float(pixels) = &mut image.pixels {
@@ -104,9 +125,9 @@ fn check_size(path: &Path, width: usize, height: usize) -> Result<()> {
     }
 }
 
-fn read_other(path: &Path, bytes: Vec<u8>, options: ReadOptions, odd: &mut Vec<String>) -> Result<Image> {
+fn read_other(path: &Path, bytes: &[u8], options: ReadOptions, odd: &mut Vec<String>) -> Result<Image> {
     let bad = |e: image::ImageError| Error::input(path, format!("not a readable image: {e}"));
-    let bytes = radiance(&bytes);
+    let bytes = radiance(bytes);
     let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(|e| Error::io(path, e))?;
     match reader.format() {
         None => reader.set_format(ImageFormat::from_path(path).map_err(bad)?),
@@ -126,12 +147,16 @@ fn read_other(path: &Path, bytes: Vec<u8>, options: ReadOptions, odd: &mut Vec<S
     reader.limits(limits);
     let decoded = reader.decode().map_err(bad)?;
     check_size(path, decoded.width() as usize, decoded.height() as usize)?;
-    Ok(linear(decoded, options.raw))
+    Ok(linear(decoded, options.take))
 }
 
-fn linear(decoded: DynamicImage, raw: bool) -> Image {
+fn linear(decoded: DynamicImage, take: Take) -> Image {
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-    let decode = |x: f32| if raw { x } else { linear_from_srgb(x) };
+    let decode = |x: f32| if take == Take::Color { linear_from_srgb(x) } else { x };
+    let decoded = match take {
+        Take::Channel(channel) => one_channel(decoded, usize::from(channel)),
+        Take::Color | Take::Linear => decoded,
+    };
     let color = |p: &[f32]| Rgb::new(p[0], p[1], p[2]);
     let pixels = match &decoded {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
@@ -150,6 +175,33 @@ fn linear(decoded: DynamicImage, raw: bool) -> Image {
         }
     };
     Image::new(width, height, pixels)
+}
+
+/// One of an image's four channels, as a grey image.
+fn one_channel(decoded: DynamicImage, channel: usize) -> DynamicImage {
+    let (width, height) = (decoded.width(), decoded.height());
+    fn every<T: Copy>(rgba: &[T], channel: usize) -> Vec<T> {
+        rgba.iter().skip(channel).step_by(4).copied().collect()
+    }
+    let grey = match &decoded {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+            let values = every(decoded.into_rgba32f().as_raw(), channel);
+            let rgb = values.into_iter().flat_map(|x| [x; 3]).collect();
+            image::Rgb32FImage::from_raw(width, height, rgb).map(DynamicImage::ImageRgb32F)
+        }
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => {
+            let values = every(decoded.into_rgba16().as_raw(), channel);
+            image::ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLuma16)
+        }
+        _ => {
+            let values = every(decoded.into_rgba8().as_raw(), channel);
+            image::GrayImage::from_raw(width, height, values).map(DynamicImage::ImageLuma8)
+        }
+    };
+    grey.unwrap_or_default()
 }
 
 /// A Radiance picture as the decoder knows it: `#?RGBE` and others stand for `#?RADIANCE`, and lines may end as on Windows.
@@ -198,7 +250,8 @@ mod tests {
 
     /// An image without any oddity.
     fn read(path: &Path, raw: bool) -> Result<Image> {
-        super::read(path, ReadOptions { raw, ..ReadOptions::default() }).map(|(image, odd)| {
+        let take = if raw { Take::Linear } else { Take::Color };
+        super::read(path, ReadOptions { take, ..ReadOptions::default() }).map(|(image, odd)| {
             assert!(odd.is_empty(), "{odd:?}");
             image
         })
@@ -233,6 +286,28 @@ mod tests {
         let grey = dir.path().join("y.exr");
         ExrImage::new(1, 1).with_f32("depth", vec![3.0]).write(&grey).unwrap();
         assert_eq!(read(&grey, true).unwrap().pixel(0, 0), Rgb::splat(3.0));
+    }
+
+    #[test]
+    fn single_channels_are_linear_and_alpha_is_one_where_there_is_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let of = |path: &Path, channel: u8| {
+            let options = ReadOptions { take: Take::Channel(channel), ..ReadOptions::default() };
+            super::read(path, options).unwrap().0.pixel(0, 0)
+        };
+        let (rgba, rgb, deep) = (dir.path().join("a.png"), dir.path().join("b.png"), dir.path().join("c.png"));
+        image::RgbaImage::from_pixel(1, 1, image::Rgba([255, 51, 102, 204])).save(&rgba).unwrap();
+        image::RgbImage::from_pixel(1, 1, image::Rgb([255, 51, 102])).save(&rgb).unwrap();
+        image::ImageBuffer::from_pixel(1, 1, image::Rgba([0u16, 13107, 65535, 26214])).save(&deep).unwrap();
+        for (path, expected) in [(&rgba, [1.0, 0.2, 0.4, 0.8]), (&rgb, [1.0, 0.2, 0.4, 1.0]), (&deep, [0.0, 0.2, 1.0, 0.4])] {
+            for (channel, expected) in expected.into_iter().enumerate() {
+                let found = of(path, channel as u8);
+                assert!((found - Rgb::splat(expected)).abs().max_element() < 1e-6, "{path:?} {channel}: {found}");
+            }
+        }
+        let exr = dir.path().join("a.exr");
+        ExrImage::new(1, 1).with_rgb("", &[Rgb::new(0.5, 4.0, 0.25)]).write(&exr).unwrap();
+        assert_eq!((of(&exr, 1), of(&exr, 3)), (Rgb::splat(4.0), Rgb::ONE));
     }
 
     /// Values: Mitsuba 3.9.1's `Bitmap` of the same files.

@@ -4,7 +4,7 @@ mod file;
 
 use crate::base::math::Rgb;
 
-pub use file::{ReadOptions, read};
+pub use file::{ReadOptions, Take, decode, read};
 
 /// Linear RGB pixels, row 0 at the top of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,9 +54,33 @@ impl Image {
         Self { width, height, pixels: Pixels::Bytes { rgb, linear: Box::new(linear) } }
     }
 
+    /// A function of every pixel.
+    pub fn changed(&self, f: impl Fn(Rgb) -> Rgb) -> Self {
+        Self::new(self.width, self.height, self.all().map(f).collect())
+    }
+
+    /// Red, green or blue (0 to 2) as grey, or white.
+    pub fn channel(&self, channel: u8) -> Self {
+        self.changed(|p| Rgb::splat(p.to_array().get(usize::from(channel)).copied().unwrap_or(1.0)))
+    }
+
+    /// A function of every number of every pixel; bytes stay bytes.
+    pub fn map(&self, f: impl Fn(f32) -> f32) -> Self {
+        let pixels = match &self.pixels {
+            Pixels::Float(pixels) => Pixels::Float(pixels.iter().map(|p| p.map(&f)).collect()),
+            Pixels::Bytes { rgb, linear } => Pixels::Bytes { rgb: rgb.clone(), linear: Box::new(linear.map(f)) },
+        };
+        Self { pixels, ..*self }
+    }
+
+    /// Pixels in order.
+    fn all(&self) -> impl Iterator<Item = Rgb> {
+        (0..self.width * self.height).map(|i| self.at(i))
+    }
+
     /// Mean of all pixels.
     pub fn mean(&self) -> Rgb {
-        let sum: glam::DVec3 = (0..self.width * self.height).map(|i| self.at(i).as_dvec3()).sum();
+        let sum: glam::DVec3 = self.all().map(|p| p.as_dvec3()).sum();
         (sum / (self.width * self.height) as f64).as_vec3()
     }
 

@@ -15,8 +15,8 @@ use super::assets::{Assets, ids, walk};
 use super::params::{Ids, Params};
 use super::tree::{Kind, Node, Param, Parsed, Value};
 use super::{json, xml};
-use crate::scene::units::{self, UnitScale};
-use crate::scene::{Scene, hash};
+use crate::exchange::{LoadOptions, finish};
+use crate::scene::Scene;
 use crate::{Error, Result};
 use attribute::Current;
 use glam::DMat4;
@@ -27,19 +27,6 @@ use std::path::Path;
 /// Most scattering models and textures in a scene: references to references could multiply without end.
 const MAX_BUILT: usize = 200_000;
 
-/// What the command line says about loading.
-#[derive(Debug, Clone, Default)]
-pub struct LoadOptions {
-    /// Multiplies all lengths (`--unit-scale`); `None` chooses what [`units::metric`] says.
-    pub unit_scale: Option<f32>,
-    /// Values for the scene's `$name` parameters, over its `default`s.
-    pub defines: Vec<(String, String)>,
-    /// Leave out, with a warning, what is not supported (`--skip-unsupported`).
-    pub skip_unsupported: bool,
-    /// Take images whose files end early, with a warning (`--allow-truncated`).
-    pub allow_truncated: bool,
-}
-
 /// Loads a Mitsuba XML file, or its JSON form (a file named `.json`).
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -48,24 +35,10 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let ids = ids(&children)?;
     let assets = Assets::load(&children, options.allow_truncated)?;
     warnings.extend_from_slice(assets.warnings());
-    let with_scale = |scale: UnitScale| {
-        let scene = Scene { path: path.to_owned(), warnings: warnings.clone(), unit_scale: scale, ..Scene::default() };
+    finish::in_metres(path, options.unit_scale, |unit_scale| {
+        let scene = Scene { path: path.to_owned(), warnings: warnings.clone(), unit_scale, ..Scene::default() };
         built(scene, (&children, &ids, &assets), options.skip_unsupported)
-    };
-    let mut scene = with_scale(UnitScale(options.unit_scale.unwrap_or(1.0)))?;
-    if options.unit_scale.is_none()
-        && let Some(scale) = units::metric(&scene.geometry)
-    {
-        // Built anew, as lengths are rounded only once that way.
-        scene = with_scale(scale)?;
-        let (path, scale) = (path.display(), scale.0);
-        scene.warnings.push(format!(
-            "{path} is too small or too large for metres: all its lengths are taken times {scale:e}, in outputs and options too \
-             (--unit-scale {scale:e}; 1 leaves them as they are)"
-        ));
-    }
-    scene.hash = hash::content(&scene)?;
-    Ok(scene)
+    })
 }
 
 /// Fills an empty scene with what stands under it in its file.
@@ -102,21 +75,7 @@ fn built(scene: Scene, (children, ids, assets): (&[Param], &Ids, &Assets), skip_
         }
     }
     Error::gather(results).map_err(|e| hint(e, &path))?;
-    let mut scene = builder.scene;
-    if let Some(sensor) = &mut scene.sensor {
-        sensor.drop_idle_clip(&scene.geometry);
-    }
-    if scene.geometry.triangles.is_empty() {
-        return Err(Error::input(&path, "the scene has no triangles"));
-    }
-    let area: f64 = (0..scene.geometry.triangles.len() as u32).map(|t| f64::from(scene.geometry.area_normal(t).length())).sum();
-    if !(area > 0.0 && area.is_finite()) {
-        return Err(Error::input(&path, format!("all triangles together have an area of {}: expected more than 0", area / 2.0)));
-    }
-    if scene.emitters.is_empty() {
-        scene.warnings.push(format!("{}: the scene has no emitter, so every image of it is black", path.display()));
-    }
-    Ok(scene)
+    Ok(builder.scene)
 }
 
 /// Says of several errors which file they are about, and of what is not supported that it can be left out.

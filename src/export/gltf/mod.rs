@@ -1,0 +1,199 @@
+//! glTF 2.0 as one binary file: a scene with its light map on the second texture coordinates.
+//!
+//! No ratified extension has light maps. `MX_lightmap` (of nodes, RGBM) is the one here, with the map's relative luminance as occlusion for viewers
+//! that do not know it.
+
+mod looks;
+mod pixels;
+mod shapes;
+mod writer;
+
+use crate::Result;
+use crate::base::math::{Rgb, luminance};
+use crate::lightmap::LightMap;
+use crate::scene::{Camera, Emitter, Scene};
+use glam::{Affine3A, DMat3, DMat4, DQuat, Mat4, Quat, Vec3};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use writer::Writer;
+
+/// Share of the map's texels that are as bright as occlusion's white, or brighter.
+const BRIGHT: f32 = 0.05;
+
+/// Where a GLB file's JSON starts, and how ours does.
+const JSON_AT: usize = 20;
+const OURS: &[u8] = br#"{"asset":{"generator":"reprobe "#;
+
+/// A GLB file, and what of the scene is not in it.
+pub struct Exported {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// One line each.
+    pub warnings: Vec<String>,
+    /// Materials in it.
+    pub materials: usize,
+    /// Shapes whose light is the map's `back`, turned round so that viewers light what is seen.
+    pub turned: usize,
+}
+
+/// Writes a scene, and the light map that was baked for it.
+pub fn glb(scene: &Scene, lightmap: Option<&LightMap>, provenance: &Value) -> Result<Exported> {
+    let mut warnings = Vec::new();
+    let mut writer = Writer::default();
+    let maps = lightmap.map(|map| Maps::write(&mut writer, map)).transpose()?;
+    let mut materials = BTreeMap::new();
+    let (mut roots, mut turned) = (Vec::new(), 0);
+    for object in 0..scene.geometry.objects.len() {
+        let of = &scene.geometry.objects[object];
+        let key = (of.material, of.emitter);
+        let material = match materials.get(&key) {
+            Some(material) => *material,
+            None => {
+                let radiance = of.emitter.and_then(|e| match scene.emitters.get(e as usize) {
+                    Some(Emitter::Area { radiance, .. }) => Some(radiance),
+                    _ => None,
+                });
+                let written = looks::material(&mut writer, &scene.materials[of.material as usize], radiance, &mut warnings)?;
+                materials.insert(key, written);
+                written
+            }
+        };
+        let is_turned = lightmap.is_some_and(|map| shapes::is_lit_from_behind(&scene.geometry, object, map));
+        turned += usize::from(is_turned);
+        let shape = shapes::shape(&scene.geometry, object, lightmap, is_turned);
+        let mesh = shape.write(&mut writer, &of.name, material);
+        let mut node = json!({ "mesh": mesh, "name": of.name });
+        if let Some(maps) = &maps {
+            node["extensions"] = json!({ "MX_lightmap": maps.of(is_turned) });
+        }
+        roots.push(writer.push("nodes", node));
+    }
+    if let Some(maps) = &maps {
+        writer.uses("MX_lightmap");
+        writer.occlude(maps.occlusion);
+    }
+    let lights = lights(&mut writer, &scene.emitters, &mut roots, &mut warnings);
+    if let Some(camera) = &scene.sensor {
+        roots.extend(sensor(&mut writer, camera));
+    }
+    warnings.sort();
+    warnings.dedup();
+    let count = materials.len();
+    writer.push("scenes", json!({ "nodes": roots }));
+    let asset = json!({ "generator": concat!("reprobe ", env!("CARGO_PKG_VERSION")), "version": "2.0", "extras": { "provenance": provenance } });
+    let mut extensions = Map::new();
+    if !lights.is_empty() {
+        extensions.insert("KHR_lights_punctual".into(), json!({ "lights": lights }));
+    }
+    Ok(Exported { bytes: writer.finish(asset, Value::Object(extensions))?, warnings, materials: count, turned })
+}
+
+/// Whether a file that begins like this was written by [`glb`].
+pub fn is_ours(start: &[u8]) -> bool {
+    start.get(JSON_AT..).is_some_and(|json| json.starts_with(OURS))
+}
+
+/// The textures of a light map.
+struct Maps {
+    front: usize,
+    back: Option<usize>,
+    occlusion: usize,
+    intensity: f32,
+}
+
+impl Maps {
+    fn write(writer: &mut Writer, map: &LightMap) -> Result<Self> {
+        let size = map.size.map(|n| n as usize);
+        let all = || map.front.iter().chain(map.back.iter().flatten());
+        let largest = all().map(|p| p.max_element()).fold(0.0, f32::max);
+        let intensity = (largest / pixels::RGBM_RANGE).max(1.0);
+        let sampler = || json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 });
+        let mut texture = |pixels: &[Rgb], name: &str| -> Result<usize> {
+            let picture: Vec<Rgb> = pixels.iter().take(size[0] * size[1]).map(|p| *p / intensity).collect();
+            Ok(writer.texture(&pixels::rgbm(&picture, size)?, name, sampler()))
+        };
+        let front = texture(&map.front, "irradiance")?;
+        let back = map.back.as_ref().map(|back| texture(back, "irradiance of backs")).transpose()?;
+        let mut bright: Vec<f32> = map.front.iter().map(|p| luminance(*p)).filter(|l| *l > 0.0).collect();
+        bright.sort_unstable_by(f32::total_cmp);
+        let white = bright.get((bright.len() as f32 * (1.0 - BRIGHT)) as usize).copied().unwrap_or(1.0);
+        let shares: Vec<f32> = map.front.iter().take(size[0] * size[1]).map(|p| luminance(*p) / white).collect();
+        let occlusion = writer.texture(&pixels::occlusion(&shares, size)?, "relative irradiance", sampler());
+        Ok(Self { front, back, occlusion, intensity })
+    }
+
+    fn of(&self, turned: bool) -> Value {
+        let index = self.back.filter(|_| turned).unwrap_or(self.front);
+        json!({ "lightMapTexture": { "index": index, "texCoord": 1 }, "intensity": self.intensity })
+    }
+}
+
+/// Writes the nodes of the lights that have a place; returns the lights.
+fn lights(writer: &mut Writer, emitters: &[Emitter], roots: &mut Vec<usize>, warnings: &mut Vec<String>) -> Vec<Value> {
+    let mut lights = Vec::new();
+    for emitter in emitters {
+        match light(emitter) {
+            Some((light, to_world)) => {
+                writer.uses("KHR_lights_punctual");
+                lights.push(light);
+                let extension = json!({ "KHR_lights_punctual": { "light": lights.len() - 1 } });
+                roots.push(writer.push("nodes", placed(json!({ "extensions": extension }), &to_world)));
+            }
+            None if matches!(emitter, Emitter::Area { .. }) => {}
+            None => warnings.push("light from the environment, of a sun's disc or a projector is left out: glTF has none".into()),
+        }
+    }
+    lights
+}
+
+/// A light of `KHR_lights_punctual`, and where it stands.
+fn light(emitter: &Emitter) -> Option<(Value, DMat4)> {
+    let of = |color: Rgb, kind: &str| {
+        let strength = color.max_element().max(f32::MIN_POSITIVE);
+        json!({ "type": kind, "color": (color / strength).to_array(), "intensity": strength })
+    };
+    let towards = |d: Vec3| DMat4::from_quat(DQuat::from_rotation_arc(glam::DVec3::NEG_Z, d.as_dvec3().normalize()));
+    let at = |p: Vec3| DMat4::from_translation(p.as_dvec3());
+    Some(match emitter {
+        Emitter::Point { position, intensity } => (of(*intensity, "point"), at(*position)),
+        Emitter::Directional { direction, irradiance } => (of(*irradiance, "directional"), towards(*direction)),
+        Emitter::Spot { position, direction, intensity, cutoff_rad, beam_rad, .. } => {
+            let mut light = of(*intensity, "spot");
+            let outer = cutoff_rad.min(std::f32::consts::FRAC_PI_2);
+            light["spot"] = json!({ "innerConeAngle": beam_rad.min(outer * 0.9999), "outerConeAngle": outer });
+            (light, at(*position) * towards(*direction))
+        }
+        _ => return None,
+    })
+}
+
+/// A camera's node; orthographic and shifted ones are taken for what their middle sees.
+fn sensor(writer: &mut Writer, camera: &Camera) -> Option<usize> {
+    let [width, height] = camera.size.map(|n| n as f32);
+    let entry = match camera.orthographic {
+        Some(half) => {
+            json!({ "type": "orthographic", "orthographic": { "xmag": half.x, "ymag": half.y * height / width, "znear": 0.01, "zfar": 1000.0 } })
+        }
+        None => {
+            let yfov = 2.0 * ((0.5 * camera.fov_x).tan() * height / width).atan();
+            json!({ "type": "perspective", "perspective": { "yfov": yfov, "aspectRatio": width / height, "znear": 0.01 } })
+        }
+    };
+    let Affine3A { matrix3, translation } = camera.to_world;
+    let [x, y, z] = [matrix3.x_axis, matrix3.y_axis, matrix3.z_axis].map(|axis| Vec3::from(axis).as_dvec3());
+    let turn = DMat3::from_cols(-x, y, -z);
+    if turn.determinant() <= 0.0 {
+        return None;
+    }
+    let to_world = DMat4::from_rotation_translation(DQuat::from_mat3(&turn), Vec3::from(translation).as_dvec3());
+    let camera = writer.push("cameras", entry);
+    Some(writer.push("nodes", placed(json!({ "camera": camera }), &to_world)))
+}
+
+/// A node with its place.
+fn placed(mut node: Value, to_world: &DMat4) -> Value {
+    let (_, rotation, translation): (_, Quat, Vec3) = Mat4::to_scale_rotation_translation(&to_world.as_mat4());
+    node["rotation"] = json!(rotation.normalize().to_array());
+    node["translation"] = json!(translation.to_array());
+    node
+}

@@ -1,0 +1,89 @@
+//! Triangles of one shape with both sets of texture coordinates.
+
+use super::writer::Writer;
+use crate::base::math::luminance;
+use crate::lightmap::LightMap;
+use crate::scene::Geometry;
+use glam::{Vec2, Vec3};
+use serde_json::{Value, json};
+use std::collections::HashMap;
+
+/// How many times more light on its back makes a shape one that is seen from there.
+const BEHIND: f32 = 4.0;
+
+/// Attributes by vertex.
+pub struct Shape {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    /// Of the light map, in [0, 1]².
+    atlas: Vec<Vec2>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// Whether a shape's light is that of its back.
+pub fn is_lit_from_behind(geometry: &Geometry, object: usize, map: &LightMap) -> bool {
+    let middle = Vec2::splat(1.0 / 3.0);
+    let side = |back: bool| {
+        let of = geometry.objects[object].triangles.clone();
+        of.map(|t| luminance(map.lookup(t, middle, back)) * geometry.area_normal(t).length()).sum::<f32>()
+    };
+    map.back.is_some() && side(true) > BEHIND * side(false)
+}
+
+/// A shape's triangles. Vertices are split where faces are flat and where charts of the light map part; `turned` shows the back.
+pub fn shape(geometry: &Geometry, object: usize, map: Option<&LightMap>, turned: bool) -> Shape {
+    let of = &geometry.objects[object];
+    let mut shape =
+        Shape { positions: Vec::new(), normals: Vec::new(), uvs: Vec::new(), atlas: Vec::new(), triangles: Vec::new() };
+    let mut numbers: HashMap<(u32, [u32; 2], [u32; 3]), u32> = HashMap::new();
+    for triangle in of.triangles.clone() {
+        let corners = geometry.triangles[triangle as usize];
+        let flat = geometry.area_normal(triangle).try_normalize().unwrap_or(Vec3::Y);
+        let places = map.and_then(|map| map.places(triangle)).unwrap_or([Vec2::ZERO; 3]);
+        let mut written = [0, 1, 2].map(|k| {
+            let vertex = corners[k];
+            let normal = match of.face_normals {
+                true => flat,
+                false => geometry.normals[vertex as usize].try_normalize().unwrap_or(flat),
+            };
+            let normal = if turned { -normal } else { normal };
+            let key = (vertex, places[k].to_array().map(f32::to_bits), normal.to_array().map(f32::to_bits));
+            *numbers.entry(key).or_insert_with(|| {
+                shape.positions.push(geometry.positions[vertex as usize]);
+                shape.normals.push(normal);
+                shape.uvs.push(geometry.uvs[vertex as usize]);
+                shape.atlas.push(places[k]);
+                shape.positions.len() as u32 - 1
+            })
+        });
+        if turned {
+            written.swap(1, 2);
+        }
+        shape.triangles.push(written);
+    }
+    if map.is_none() {
+        shape.atlas.clear();
+    }
+    if !of.has_uvs && map.is_none() {
+        shape.uvs.clear();
+    }
+    shape
+}
+
+impl Shape {
+    /// Writes it as a mesh of one primitive; returns its number.
+    pub fn write(&self, writer: &mut Writer, name: &str, material: usize) -> usize {
+        let mut attributes = json!({ "POSITION": writer.positions(&self.positions), "NORMAL": writer.directions(&self.normals) });
+        let mut add = |name: &str, uvs: &[Vec2]| {
+            if !uvs.is_empty() {
+                attributes[name] = json!(writer.coordinates(uvs));
+            }
+        };
+        add("TEXCOORD_0", &self.uvs);
+        add("TEXCOORD_1", &self.atlas);
+        let indices = writer.triangles(&self.triangles);
+        let primitive: Value = json!({ "attributes": attributes, "indices": indices, "material": material });
+        writer.push("meshes", json!({ "name": name, "primitives": [primitive] }))
+    }
+}
