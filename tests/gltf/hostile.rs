@@ -28,7 +28,7 @@ fn what_is_wrong_is_said() {
         (|j| j["bufferViews"][0]["byteLength"] = json!(u64::MAX), "buffer view 0 asks for"),
         (|j| j["bufferViews"][0]["byteStride"] = json!(0), "0 apart"),
         (|j| j["bufferViews"][0]["buffer"] = json!(3), "no buffer 3"),
-        (|j| j["accessors"][3]["componentType"] = json!(5126), "expected whole numbers"),
+        (|j| j["accessors"][3]["componentType"] = json!(5122), "expected whole numbers"),
         (|j| j["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]), "cannot do without KHR_draco_mesh_compression"),
         (|j| j["materials"][0]["normalTexture"] = json!({ "index": 0 }), "no texture 0"),
         (|j| j["nodes"][0]["matrix"] = json!([1e30, 0, 0, 0, 0, 1e30, 0, 0, 0, 0, 1e30, 0, 0, 0, 0, 1]), "area"),

@@ -286,7 +286,13 @@ fn lights_and_cameras_are_made_up_where_there_are_none() {
     let scene = loaded(&with_material(json!({})).gltf(folder.path()));
     assert!(matches!(scene.emitters[..], [Emitter::Constant { radiance: Vec3::ONE }]));
     let told = scene.warnings.join("\n");
-    assert!(told.contains("has no light") && told.contains("has no camera"), "{told}");
+    assert!(told.contains("the same white light") && told.contains("has no camera"), "{told}");
+    // Parts that glow light a scene, which has a camera, and no model.
+    let mut document = with_material(json!({ "emissiveFactor": [1, 1, 1] }));
+    assert_eq!(loaded(&document.gltf(folder.path())).emitters.len(), 2);
+    document.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1 } }]);
+    document.json["nodes"].as_array_mut().unwrap().push(json!({ "camera": 0 }));
+    assert_eq!(loaded(&document.gltf(folder.path())).emitters.len(), 1);
     // All of it is in the picture.
     let camera = scene.sensor.unwrap();
     for corner in [Vec3::ZERO, Vec3::X, Vec3::ONE - Vec3::Z, Vec3::Y] {

@@ -86,9 +86,12 @@ impl Builder<'_> {
         });
         Error::gather(added.collect::<Vec<_>>())?;
         let path = self.file.path.display();
-        if self.scene.emitters.is_empty() {
+        // Of a model by itself, glowing parts are not what it is to be seen by.
+        let is_model = self.scene.sensor.is_none() && self.scene.emitters.iter().all(|e| matches!(e, Emitter::Area { .. }));
+        if self.scene.emitters.is_empty() || is_model {
+            let what = if self.scene.emitters.is_empty() { "no light" } else { "no camera, and no light but what glows" };
+            self.scene.warnings.push(format!("{path} has {what}: the same white light comes from all sides"));
             self.scene.emitters.push(Emitter::Constant { radiance: Rgb::ONE });
-            self.scene.warnings.push(format!("{path} has no light: the same white light comes from all sides"));
         }
         if self.scene.sensor.is_none() {
             self.stand_back();
