@@ -5,10 +5,12 @@ pub mod canvas;
 pub mod exr;
 pub mod jobs;
 pub mod json;
+pub mod layer;
 pub mod picture;
 pub mod primaries;
 pub mod provenance;
 mod seal;
+pub mod sheet;
 mod subsampled;
 mod text;
 

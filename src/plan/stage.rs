@@ -2,7 +2,7 @@
 
 use super::stages::{
     BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
-    PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
+    PlaceProbes, Qhmap, Relight, RenderPath, Resmap, View,
 };
 use super::{Context, Outcome, overwrite};
 use crate::Result;
@@ -39,6 +39,8 @@ pub enum Stage {
     InspectLightfield(InspectLightfield),
     /// `inspect-transport`
     InspectTransport(InspectTransport),
+    /// `view`
+    View(View),
 }
 
 /// The stages that bake, in the order in which they run.
@@ -70,6 +72,7 @@ macro_rules! with {
             Stage::Compare($s) => $what,
             Stage::InspectLightfield($s) => $what,
             Stage::InspectTransport($s) => $what,
+            Stage::View($s) => $what,
         }
     };
 }
@@ -94,7 +97,8 @@ from!(
     RenderPath,
     Compare,
     InspectLightfield,
-    InspectTransport
+    InspectTransport,
+    View
 );
 
 impl Stage {
@@ -117,6 +121,7 @@ impl Stage {
             Self::Compare(s) => of(s, Compare::COMMAND),
             Self::InspectLightfield(s) => of(s, InspectLightfield::COMMAND),
             Self::InspectTransport(s) => of(s, InspectTransport::COMMAND),
+            Self::View(s) => of(s, View::COMMAND),
         }
     }
 
@@ -150,6 +155,7 @@ impl Stage {
             Self::BakeProbes(s) => [&s.probes, &s.qhmap].into_iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::RenderPath(s) => s.probes.iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::Compare(s) => vec![&s.image, &s.reference],
+            Self::View(s) => s.files.iter().collect(),
         }
     }
 
@@ -167,7 +173,7 @@ impl Stage {
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),
             Self::InspectTransport(s) => [&s.scene].into_iter().chain(&s.path).collect(),
-            Self::Qhmap(_) => vec![],
+            Self::Qhmap(_) | Self::View(_) => vec![],
             Self::Compare(s) => s.second_reference.iter().collect(),
         }
     }
@@ -188,7 +194,7 @@ impl Stage {
     }
 
     fn reads_scene(&self) -> bool {
-        !matches!(self, Self::Qhmap(_) | Self::Compare(_))
+        !matches!(self, Self::Qhmap(_) | Self::Compare(_) | Self::View(_))
     }
 
     /// The command and its arguments, as the program takes them.

@@ -21,6 +21,7 @@ mod render_path;
 mod resmap;
 mod run;
 mod terminal;
+mod view;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 use common::Common;
@@ -69,6 +70,7 @@ enum Command {
     InspectTransport(inspect_transport::Args),
     Devices(devices::Args),
     Info(info::Args),
+    View(view::Args),
     Run(run::Args),
     Evaluate(evaluate::Args),
 }
@@ -99,8 +101,13 @@ fn main() -> ExitCode {
 
 /// What was typed; usage errors end the process.
 fn parse() -> Cli {
-    let matches = common::hide_idle(Cli::command()).get_matches_from(joined(std::env::args_os()));
+    let matches = typed().get_matches_from(joined(std::env::args_os()));
     Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())
+}
+
+/// The commands and their options, as they can be typed.
+fn typed() -> clap::Command {
+    common::hide_idle(Cli::command())
 }
 
 /// Words with `--denoise` and what may follow it as one: it stands alone too, and then the next word is not its value, but the scene, say.
@@ -141,6 +148,7 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::Compare(args) => args.stage().into(),
         Command::InspectLightfield(args) => args.stage().into(),
         Command::InspectTransport(args) => args.stage().into(),
+        Command::View(args) => args.stage().into(),
         Command::Devices(args) => return devices::run(&args),
         Command::Info(args) => {
             cx.refuse_gpu("info")?;
@@ -160,7 +168,7 @@ mod tests {
     use super::*;
     use reprobe::plan::stages::{
         BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
-        PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
+        PlaceProbes, Qhmap, Relight, RenderPath, Resmap, View,
     };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -181,6 +189,7 @@ mod tests {
             (Compare::COMMAND, Compare::OPTIONS),
             (InspectLightfield::COMMAND, InspectLightfield::OPTIONS),
             (InspectTransport::COMMAND, InspectTransport::OPTIONS),
+            (View::COMMAND, View::OPTIONS),
         ] {
             let sub = cli.find_subcommand(command).unwrap_or_else(|| panic!("no subcommand {command}"));
             let mut typed: Vec<String> = sub.get_arguments().filter_map(|a| Some(format!("--{}", a.get_long()?))).collect();
@@ -194,12 +203,12 @@ mod tests {
 
     #[test]
     fn the_command_line_is_well_formed() {
-        common::hide_idle(Cli::command()).debug_assert();
+        typed().debug_assert();
     }
 
     #[test]
     fn help_has_examples_and_the_options_that_do_something() {
-        let mut cli = common::hide_idle(Cli::command());
+        let mut cli = typed();
         cli.build();
         for sub in cli.get_subcommands_mut().filter(|sub| sub.get_name() != "help") {
             let (name, help) = (sub.get_name().to_owned(), sub.render_long_help().to_string());
@@ -207,7 +216,8 @@ mod tests {
             let shows = |option: &str| help.contains(&format!("  {option} ")) || help.contains(&format!(", {option} "));
             let runs_on_gpu = ["resmap", "bake-probes", "bake-lightmap", "render-path", "run", "evaluate"].contains(&&*name);
             assert_eq!(shows("--device"), runs_on_gpu, "{name}");
-            assert_eq!(shows("--unit-scale"), !["qhmap", "compare", "devices"].contains(&&*name), "{name}");
+            let reads_no_scene = ["qhmap", "compare", "devices", "view"].contains(&&*name);
+            assert_eq!(shows("--unit-scale"), !reads_no_scene, "{name}");
         }
     }
 
@@ -222,20 +232,20 @@ mod tests {
             ("scene.xml -o out", None),
         ] {
             let words = ["reprobe", "render-path"].into_iter().chain(words.split(' ')).map(OsString::from);
-            let matches = common::hide_idle(Cli::command()).try_get_matches_from(joined(words)).unwrap();
+            let matches = typed().try_get_matches_from(joined(words)).unwrap();
             let Command::RenderPath(args) = Cli::from_arg_matches(&matches).unwrap().command else { panic!("another command") };
             let stage = args.stage();
             assert_eq!((stage.denoise, stage.scene.to_str()), (expected, Some("scene.xml")));
         }
         let words = ["reprobe", "render-path", "scene.xml", "-o", "out", "--denoise=magic"].map(OsString::from);
-        let refused = common::hide_idle(Cli::command()).try_get_matches_from(joined(words.into_iter())).err().unwrap();
+        let refused = typed().try_get_matches_from(joined(words.into_iter())).err().unwrap();
         assert!(refused.to_string().contains("expected one of oidn, filter"), "{refused}");
     }
 
     #[test]
     fn an_option_that_does_nothing_for_a_command_is_taken_all_the_same() {
         let words = ["reprobe", "qhmap", "resmap", "-o", "qhmap", "--seed", "7", "--device", "cpu"];
-        let matches = common::hide_idle(Cli::command()).try_get_matches_from(words).unwrap();
+        let matches = typed().try_get_matches_from(words).unwrap();
         let cli = Cli::from_arg_matches(&matches).unwrap();
         assert_eq!((cli.common.seed, cli.common.device), (7, Choice::Cpu));
     }

@@ -14,6 +14,7 @@ mod relight;
 mod render_path;
 mod resmap;
 mod set;
+mod view;
 
 pub use bake_lightfield::BakeLightfield;
 pub use bake_lightmap::BakeLightmap;
@@ -28,3 +29,4 @@ pub use qhmap::Qhmap;
 pub use relight::Relight;
 pub use render_path::{Aov, RenderPath};
 pub use resmap::Resmap;
+pub use view::View;
