@@ -1,4 +1,4 @@
-//! Files: EXR layers, JSON, pictures and diagrams, atomic writes, provenance, checksums.
+//! Files: EXR layers, JSON, pictures, diagrams and videos, atomic writes, provenance, checksums.
 
 pub mod atomic;
 pub mod canvas;
@@ -13,6 +13,7 @@ mod seal;
 pub mod sheet;
 mod subsampled;
 mod text;
+pub mod video;
 
 pub use exr::{ExrImage, Samples};
 pub use provenance::Provenance;

@@ -2,7 +2,7 @@
 
 use super::stages::{
     BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
-    PlaceProbes, Qhmap, Relight, RenderPath, Resmap, View,
+    PlaceProbes, Qhmap, Relight, RenderPath, Resmap, Video, View,
 };
 use super::{Context, Outcome, overwrite};
 use crate::Result;
@@ -41,6 +41,8 @@ pub enum Stage {
     InspectTransport(InspectTransport),
     /// `view`
     View(View),
+    /// `video`
+    Video(Video),
 }
 
 /// The stages that bake, in the order in which they run.
@@ -73,6 +75,7 @@ macro_rules! with {
             Stage::InspectLightfield($s) => $what,
             Stage::InspectTransport($s) => $what,
             Stage::View($s) => $what,
+            Stage::Video($s) => $what,
         }
     };
 }
@@ -98,7 +101,8 @@ from!(
     Compare,
     InspectLightfield,
     InspectTransport,
-    View
+    View,
+    Video
 );
 
 impl Stage {
@@ -122,6 +126,7 @@ impl Stage {
             Self::InspectLightfield(s) => of(s, InspectLightfield::COMMAND),
             Self::InspectTransport(s) => of(s, InspectTransport::COMMAND),
             Self::View(s) => of(s, View::COMMAND),
+            Self::Video(s) => of(s, Video::COMMAND),
         }
     }
 
@@ -156,6 +161,7 @@ impl Stage {
             Self::RenderPath(s) => s.probes.iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::Compare(s) => vec![&s.image, &s.reference],
             Self::View(s) => s.files.iter().collect(),
+            Self::Video(s) => [&s.frames].into_iter().chain(&s.beside).collect(),
         }
     }
 
@@ -173,7 +179,7 @@ impl Stage {
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),
             Self::InspectTransport(s) => [&s.scene].into_iter().chain(&s.path).collect(),
-            Self::Qhmap(_) | Self::View(_) => vec![],
+            Self::Qhmap(_) | Self::View(_) | Self::Video(_) => vec![],
             Self::Compare(s) => s.second_reference.iter().collect(),
         }
     }
@@ -194,7 +200,7 @@ impl Stage {
     }
 
     fn reads_scene(&self) -> bool {
-        !matches!(self, Self::Qhmap(_) | Self::Compare(_) | Self::View(_))
+        !matches!(self, Self::Qhmap(_) | Self::Compare(_) | Self::View(_) | Self::Video(_))
     }
 
     /// The command and its arguments, as the program takes them.

@@ -69,6 +69,7 @@ pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
         ("inspect-transport", &["device", "seed"]),
         ("info", &["device", "seed"]),
         ("view", &[&["device", "seed", "threads"][..], &SCENE].concat()),
+        ("video", &[&["device", "seed"][..], &SCENE].concat()),
     ] {
         let hidden: Vec<clap::Arg> =
             cli.get_arguments().filter(|a| idle.contains(&a.get_id().as_str())).map(|a| a.clone().hide(true)).collect();

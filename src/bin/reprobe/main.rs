@@ -21,6 +21,7 @@ mod render_path;
 mod resmap;
 mod run;
 mod terminal;
+mod video;
 mod view;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -71,6 +72,7 @@ enum Command {
     Devices(devices::Args),
     Info(info::Args),
     View(view::Args),
+    Video(video::Args),
     Run(run::Args),
     Evaluate(evaluate::Args),
 }
@@ -149,6 +151,7 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::InspectLightfield(args) => args.stage().into(),
         Command::InspectTransport(args) => args.stage().into(),
         Command::View(args) => args.stage().into(),
+        Command::Video(args) => args.stage().into(),
         Command::Devices(args) => return devices::run(&args),
         Command::Info(args) => {
             cx.refuse_gpu("info")?;
@@ -168,7 +171,7 @@ mod tests {
     use super::*;
     use reprobe::plan::stages::{
         BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, InspectLightfield, InspectTransport,
-        PlaceProbes, Qhmap, Relight, RenderPath, Resmap, View,
+        PlaceProbes, Qhmap, Relight, RenderPath, Resmap, Video, View,
     };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -190,6 +193,7 @@ mod tests {
             (InspectLightfield::COMMAND, InspectLightfield::OPTIONS),
             (InspectTransport::COMMAND, InspectTransport::OPTIONS),
             (View::COMMAND, View::OPTIONS),
+            (Video::COMMAND, Video::OPTIONS),
         ] {
             let sub = cli.find_subcommand(command).unwrap_or_else(|| panic!("no subcommand {command}"));
             let mut typed: Vec<String> = sub.get_arguments().filter_map(|a| Some(format!("--{}", a.get_long()?))).collect();
@@ -216,7 +220,7 @@ mod tests {
             let shows = |option: &str| help.contains(&format!("  {option} ")) || help.contains(&format!(", {option} "));
             let runs_on_gpu = ["resmap", "bake-probes", "bake-lightmap", "render-path", "run", "evaluate"].contains(&&*name);
             assert_eq!(shows("--device"), runs_on_gpu, "{name}");
-            let reads_no_scene = ["qhmap", "compare", "devices", "view"].contains(&&*name);
+            let reads_no_scene = ["qhmap", "compare", "devices", "view", "video"].contains(&&*name);
             assert_eq!(shows("--unit-scale"), !reads_no_scene, "{name}");
         }
     }
