@@ -7,12 +7,14 @@ mod bake_probes;
 mod bake_transport;
 mod common;
 mod compare;
+mod completions;
 mod curvature;
 mod devices;
 mod evaluate;
 mod info;
 mod inspect_lightfield;
 mod inspect_transport;
+mod man;
 mod place_probes;
 mod preset;
 mod qhmap;
@@ -75,6 +77,8 @@ enum Command {
     Video(video::Args),
     Run(run::Args),
     Evaluate(evaluate::Args),
+    Completions(completions::Args),
+    Man(man::Args),
 }
 
 fn main() -> ExitCode {
@@ -159,6 +163,14 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         }
         Command::Run(args) => return run::run(&args, cx),
         Command::Evaluate(args) => return evaluate::run(&args, cx),
+        Command::Completions(args) => {
+            cx.refuse_gpu("completions")?;
+            return completions::run(&args, typed());
+        }
+        Command::Man(args) => {
+            cx.refuse_gpu("man")?;
+            return man::run(&args, typed());
+        }
     };
     if !stage.uses_gpu() {
         cx.refuse_gpu(stage.command())?;
@@ -220,7 +232,7 @@ mod tests {
             let shows = |option: &str| help.contains(&format!("  {option} ")) || help.contains(&format!(", {option} "));
             let runs_on_gpu = ["resmap", "bake-probes", "bake-lightmap", "render-path", "run", "evaluate"].contains(&&*name);
             assert_eq!(shows("--device"), runs_on_gpu, "{name}");
-            let reads_no_scene = ["qhmap", "compare", "devices", "view", "video"].contains(&&*name);
+            let reads_no_scene = ["qhmap", "compare", "devices", "view", "video", "completions", "man"].contains(&&*name);
             assert_eq!(shows("--unit-scale"), !reads_no_scene, "{name}");
         }
     }
