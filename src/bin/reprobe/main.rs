@@ -228,13 +228,38 @@ mod tests {
         cli.build();
         for sub in cli.get_subcommands_mut().filter(|sub| sub.get_name() != "help") {
             let (name, help) = (sub.get_name().to_owned(), sub.render_long_help().to_string());
-            assert!(help.contains("Examples:\n"), "{name}");
             let shows = |option: &str| help.contains(&format!("  {option} ")) || help.contains(&format!(", {option} "));
             let runs_on_gpu = ["resmap", "bake-probes", "bake-lightmap", "render-path", "run", "evaluate"].contains(&&*name);
             assert_eq!(shows("--device"), runs_on_gpu, "{name}");
             let reads_no_scene = ["qhmap", "compare", "devices", "view", "video", "completions", "man"].contains(&&*name);
             assert_eq!(shows("--unit-scale"), !reads_no_scene, "{name}");
         }
+    }
+
+    /// The lines of a command's examples, those that go on put together, without what is said of them and where they write to.
+    fn examples(after_help: &str) -> Vec<String> {
+        let text = after_help.strip_prefix("Examples:\n").unwrap_or_default().replace("\\\n", " ");
+        let lines = text.lines().filter_map(|line| line.strip_prefix("  "));
+        let typed = |line: &str| line.replace(" > ", "     ").split("     ").next().map(str::to_owned);
+        lines.filter(|line| line.starts_with("reprobe ")).filter_map(typed).collect()
+    }
+
+    #[test]
+    fn every_command_has_two_examples_of_its_own_and_all_can_be_typed() {
+        let mut shown = 0;
+        for sub in typed().get_subcommands() {
+            let name = sub.get_name();
+            let lines = examples(&sub.get_after_help().map(ToString::to_string).unwrap_or_default());
+            let own = lines.iter().filter(|line| line.split_whitespace().nth(1) == Some(name)).count();
+            assert!(own >= 2, "{name}: {own} examples of its own in {lines:?}");
+            shown += lines.len();
+            for line in lines {
+                let words = line.split_whitespace().map(OsString::from);
+                let matches = typed().try_get_matches_from(joined(words)).unwrap_or_else(|e| panic!("{line}: {e}"));
+                Cli::from_arg_matches(&matches).unwrap_or_else(|e| panic!("{line}: {e}"));
+            }
+        }
+        assert!(shown > 60, "{shown}");
     }
 
     #[test]
