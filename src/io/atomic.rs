@@ -11,14 +11,24 @@ const SUFFIX: &str = ".tmp";
 
 /// Writes `bytes` to `path` in one step; makes the folder if need be.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = begin(path)?;
+    file.write_all(bytes).map_err(|e| Error::io(path, e))?;
+    finish(file, path)
+}
+
+/// A file beside `path`, in which its content is put together; makes the folder if need be.
+pub(super) fn begin(path: &Path) -> Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };
-    let fail = |e| Error::io(path, e);
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
-    let mut file = temporary(folder).map_err(fail)?;
-    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(fail)?;
+    temporary(folder).map_err(|e| Error::io(path, e))
+}
+
+/// Gives the file its name.
+pub(super) fn finish(file: NamedTempFile, path: &Path) -> Result<()> {
+    file.as_file().sync_all().map_err(|e| Error::io(path, e))?;
     file.persist(path).map_err(|e| Error::io(path, e.error))?;
     Ok(())
 }

@@ -161,7 +161,7 @@ fn clipped([a, b]: [Vec2; 2], lower: Vec2, upper: Vec2) -> Option<[Vec2; 2]> {
 }
 
 /// Words in lines of at most `most` letters; a word that is longer stands alone.
-fn wrapped(words: &str, most: usize) -> Vec<String> {
+pub(super) fn wrapped(words: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in words.split_whitespace() {
         match lines.last_mut() {

@@ -1,11 +1,11 @@
 //! Pictures of EXR layers for people: colours as sRGB, vectors and scalars in false colours, indices in random ones.
 
-use super::{ExrImage, Samples, atomic};
+use super::layer::{Kind, Layer, Values, layers};
+use super::{ExrImage, atomic};
 use crate::base::math::hash_words;
 use crate::{Error, Result};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Bytes of a PNG file before its first chunk that says something about the picture: signature and header.
@@ -55,8 +55,12 @@ pub fn is_ours(start: &[u8]) -> bool {
 pub struct Picture {
     /// The layer's name; `image` for channels without a layer.
     pub layer: String,
+    /// What the layer holds.
+    pub kind: Kind,
     /// What its colours mean.
     pub legend: String,
+    /// What values there are.
+    pub values: Values,
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -65,63 +69,57 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
+/// How values become colours.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Look {
+    /// Stops by which colours are brightened.
+    pub exposure: f32,
+    /// What is dark and what is bright, of numbers and of each axis of vectors: their 1st and 99th percentile where it is not given.
+    pub ranges: Option<[[f32; 2]; 3]>,
+}
+
 /// A picture of each layer of `image`, in order of their names. `exposure` is in stops, for colours.
 pub fn pictures(image: &ExrImage, exposure: f32) -> Vec<Picture> {
-    let mut layers: BTreeMap<&str, Vec<(&str, &Samples)>> = BTreeMap::new();
-    for (name, samples) in &image.channels {
-        let (layer, channel) = name.rsplit_once('.').unwrap_or(("", name));
-        layers.entry(layer).or_default().push((channel, samples));
-    }
-    let mut out = Vec::new();
-    let mut add = |layer: String, legend: String, rgb: Vec<[u8; 3]>| {
-        out.push(Picture {
-            layer,
-            legend,
-            width: image.width as u32,
-            height: image.height as u32,
-            rgb: rgb.into_iter().flatten().collect(),
-        });
+    layers(image).iter().map(|layer| draw(image, layer, &Look { exposure, ranges: None })).collect()
+}
+
+/// A picture of a layer of `image`, in colours that fit what it holds; what is not finite is magenta.
+pub fn draw(image: &ExrImage, layer: &Layer, look: &Look) -> Picture {
+    let (mut legend, rgb, values) = match layer.indices() {
+        Some(indices) => {
+            let legend = "random colours, one an index; black is none".to_owned();
+            (legend, indices.iter().map(|&i| index_color(i)).collect(), Values::of_indices(indices))
+        }
+        None => {
+            let planes = layer.planes();
+            let values = Values::of(&planes);
+            let ranges = look.ranges.unwrap_or_else(|| percentiles(&planes));
+            let (legend, rgb) = match (layer.kind, planes.as_slice()) {
+                (Kind::Colour, [r, g, b]) => color([r, g, b], look.exposure),
+                (Kind::Vector, [x, y, z]) => vector([x, y, z], &ranges),
+                _ => heated(planes.first().map_or(&[], Vec::as_slice), ranges[0]),
+            };
+            (legend, rgb, values)
+        }
     };
-    for (layer, mut channels) in layers {
-        let title = if layer.is_empty() { "image" } else { layer };
-        for (names, kind) in [(["R", "G", "B"], Kind::Color), (["X", "Y", "Z"], Kind::Vector)] {
-            let Some(triple) = take(&mut channels, names) else { continue };
-            let (legend, rgb) = match kind {
-                Kind::Color => (format!("sRGB, exposure {exposure:+}"), color(&triple, exposure)),
-                Kind::Vector => vector(&triple),
-            };
-            add(title.into(), legend, rgb);
-        }
-        for (name, samples) in channels {
-            let title = if layer.is_empty() { name.to_owned() } else { format!("{layer}.{name}") };
-            let (legend, rgb) = match samples {
-                Samples::U32(v) => ("random colours, one an index".into(), v.iter().map(|&i| index_color(i)).collect()),
-                _ => scalar(&floats(samples)),
-            };
-            add(title, legend, rgb);
-        }
+    if layer.kind != Kind::Index && values.without > 0 {
+        legend += "; magenta is not finite";
     }
-    out
+    let rgb: Vec<[u8; 3]> = rgb;
+    let (width, height) = (image.width as u32, image.height as u32);
+    Picture { layer: layer.name.clone(), kind: layer.kind, legend, values, width, height, rgb: rgb.concat() }
 }
 
-enum Kind {
-    Color,
-    Vector,
+/// Stops that fit the colours of an image where nothing else is said: irradiance is as bright as a white wall that it falls on.
+pub fn usual_exposure(image: &ExrImage) -> f32 {
+    const WHITE_WALL: f32 = -1.65;
+    let is_irradiance = image.channels.iter().any(|(name, _)| name.starts_with("irradiance."));
+    if is_irradiance { WHITE_WALL } else { 0.0 }
 }
 
-fn take(channels: &mut Vec<(&str, &Samples)>, names: [&str; 3]) -> Option<[Vec<f32>; 3]> {
-    let find = |n: &str| channels.iter().find(|(c, _)| *c == n).map(|(_, s)| floats(s));
-    let triple = [find(names[0])?, find(names[1])?, find(names[2])?];
-    channels.retain(|(c, _)| !names.contains(c));
-    Some(triple)
-}
-
-fn floats(samples: &Samples) -> Vec<f32> {
-    match samples {
-        Samples::F16(v) => v.iter().map(|x| x.to_f32()).collect(),
-        Samples::F32(v) => v.clone(),
-        Samples::U32(v) => v.iter().map(|&x| x as f32).collect(),
-    }
+/// The ranges that a layer is drawn in where none is given; `None` for what has no use for them.
+pub fn ranges(layer: &Layer) -> Option<[[f32; 2]; 3]> {
+    matches!(layer.kind, Kind::Scalar | Kind::Vector).then(|| percentiles(&layer.planes()))
 }
 
 fn byte(x: f32) -> u8 {
@@ -134,37 +132,59 @@ pub fn srgb(x: f32) -> f32 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-fn color(triple: &[Vec<f32>; 3], exposure: f32) -> Vec<[u8; 3]> {
+/// What is not finite, in pictures.
+const NOT_FINITE: [u8; 3] = [255, 0, 255];
+
+/// The colours of what three channels hold.
+fn three(planes: [&[f32]; 3], shade: impl Fn(usize, f32) -> u8) -> Vec<[u8; 3]> {
+    let pixel = |i: usize| planes.map(|p| p[i]);
+    let colour = |p: [f32; 3]| {
+        let is_finite = p.iter().all(|v| v.is_finite());
+        if is_finite { std::array::from_fn(|c| shade(c, p[c])) } else { NOT_FINITE }
+    };
+    (0..planes[0].len()).map(|i| colour(pixel(i))).collect()
+}
+
+fn color(planes: [&[f32]; 3], exposure: f32) -> (String, Vec<[u8; 3]>) {
     let scale = exposure.exp2();
-    (0..triple[0].len()).map(|i| std::array::from_fn(|c| byte(srgb(triple[c][i] * scale)))).collect()
+    (format!("sRGB, exposure {exposure:+}"), three(planes, |_, v| byte(srgb(v * scale))))
 }
 
 /// The 1st and 99th percentile of the finite values.
-fn range(values: &[f32]) -> (f32, f32) {
+fn range(values: &[f32]) -> [f32; 2] {
     let mut v: Vec<f32> = values.iter().copied().filter(|x| x.is_finite()).collect();
     if v.is_empty() {
-        return (0.0, 1.0);
+        return [0.0, 1.0];
     }
     v.sort_by(f32::total_cmp);
     let at = |q: f32| v[((v.len() - 1) as f32 * q) as usize];
-    (at(0.01), at(0.99))
+    // No -0 in legends.
+    [at(0.01), at(0.99)].map(|end| end + 0.0)
 }
 
-fn vector(triple: &[Vec<f32>; 3]) -> (String, Vec<[u8; 3]>) {
-    let ranges: [(f32, f32); 3] = std::array::from_fn(|c| range(&triple[c]));
-    let legend = ranges.map(|(lo, hi)| format!("{lo:.3} to {hi:.3}")).join(", ");
-    let value = |c: usize, i: usize| byte((triple[c][i] - ranges[c].0) / (ranges[c].1 - ranges[c].0).max(1e-20));
-    (
-        (format!("X, Y, Z as red, green, blue: {legend}")),
-        (0..triple[0].len()).map(|i| std::array::from_fn(|c| value(c, i))).collect(),
-    )
+fn percentiles(planes: &[Vec<f32>]) -> [[f32; 2]; 3] {
+    std::array::from_fn(|c| planes.get(c).map_or([0.0, 1.0], |p| range(p)))
 }
 
-/// Finite values from dark to bright, and what the colours mean.
-pub fn scalar(values: &[f32]) -> (String, Vec<[u8; 3]>) {
-    let (lo, hi) = range(values);
-    let rgb = values.iter().map(|&v| if v.is_finite() { heat((v - lo) / (hi - lo).max(1e-20)) } else { [255, 0, 255] }).collect();
-    (format!("{lo:.4} (dark) to {hi:.4} (bright); magenta is not finite"), rgb)
+/// Where a value lies between two others.
+fn share(value: f32, [lo, hi]: [f32; 2]) -> f32 {
+    (value - lo) / (hi - lo).max(1e-20)
+}
+
+fn vector(planes: [&[f32]; 3], ranges: &[[f32; 2]; 3]) -> (String, Vec<[u8; 3]>) {
+    let legend = ranges.map(|[lo, hi]| format!("{lo:.3} to {hi:.3}")).join(", ");
+    let rgb = three(planes, |c, v| byte(share(v, ranges[c])));
+    (format!("X, Y, Z as red, green, blue: {legend}"), rgb)
+}
+
+fn heated(values: &[f32], [lo, hi]: [f32; 2]) -> (String, Vec<[u8; 3]>) {
+    let rgb = values.iter().map(|&v| if v.is_finite() { heat(share(v, [lo, hi])) } else { NOT_FINITE }).collect();
+    (format!("{lo:.4} (dark) to {hi:.4} (bright)"), rgb)
+}
+
+/// Finite values from dark to bright.
+pub fn scalar(values: &[f32]) -> Vec<[u8; 3]> {
+    heated(values, range(values)).1
 }
 
 /// Black over violet, red and yellow to white: brightness grows with `x` in [0, 1].
@@ -199,6 +219,30 @@ mod tests {
         assert_eq!(all[1].rgb, [255, 255, 255, 0, 0, 0]);
         assert_eq!(all[0].rgb[3..], [255, 0, 255]);
         assert_eq!(all[2].rgb[3..], [0, 0, 0]);
+        let noted = |p: &Picture| p.legend.ends_with("magenta is not finite");
+        assert_eq!([&all[0], &all[1], &all[2]].map(noted), [true, false, false]);
+    }
+
+    #[test]
+    fn ranges_and_exposure_say_what_is_bright() {
+        let image = ExrImage::new(3, 1)
+            .with_f32("m", vec![0.0, 2.0, 8.0])
+            .with_f32("n.X", vec![0.0, 2.0, f32::INFINITY])
+            .with_f32("n.Y", vec![4.0, 2.0, 1.0])
+            .with_f32("n.Z", vec![-9.0, 9.0, 1.0])
+            .with_rgb("", &[glam::Vec3::splat(0.25), glam::Vec3::splat(f32::NAN), glam::Vec3::ZERO]);
+        let of = |layer: &str, look: Look| {
+            let all = layers(&image);
+            draw(&image, all.iter().find(|l| l.name == layer).unwrap(), &look)
+        };
+        let look = Look { exposure: 2.0, ranges: Some([[0.0, 4.0]; 3]) };
+        let m = of("m", look);
+        assert_eq!(m.rgb, [heat(0.0), heat(0.5), heat(1.0)].concat());
+        assert!(m.legend.starts_with("0.0000 (dark) to 4.0000 (bright)") && m.values.ends == Some([0.0, 8.0]), "{}", m.legend);
+        assert_eq!(of("n", look).rgb, [0, 255, 0, 128, 128, 255, 255, 0, 255]);
+        let colours = of("image", look);
+        assert_eq!(colours.rgb, [255, 255, 255, 255, 0, 255, 0, 0, 0]);
+        assert!(colours.legend.contains("exposure +2; magenta") && colours.values.without == 1, "{}", colours.legend);
     }
 
     #[test]

@@ -163,16 +163,19 @@ impl OptionValue for Vec<String> {
     }
 }
 
-/// Declares a stage's struct: its inputs in the order of the command line, and its options by name.
+/// Declares a stage's struct: any number of files, where it takes such, its other inputs in the order of the command line, and its options
+/// by name.
 macro_rules! stage {
     (
         $(#[$about:meta])* $name:ident $command:literal
+        $([ $(#[$files_about:meta])* $files:ident ])?
         { $($(#[$input_about:meta])* $input:ident),* $(,)? }
         { $($(#[$option_about:meta])* $option:literal $field:ident: $type:ty),* $(,)? }
     ) => {
         $(#[$about])*
         #[derive(Debug, Clone, Default, PartialEq)]
         pub struct $name {
+            $($(#[$files_about])* pub $files: Vec<std::path::PathBuf>,)?
             $($(#[$input_about])* pub $input: std::path::PathBuf,)*
             $($(#[$option_about])* pub $field: $type,)*
         }
@@ -185,7 +188,8 @@ macro_rules! stage {
 
             /// Inputs and options as on a command line, after the subcommand.
             pub fn arguments(&self) -> Vec<std::ffi::OsString> {
-                let mut list = vec![$(self.$input.clone().into()),*];
+                let mut list: Vec<std::ffi::OsString> = vec![$(self.$input.clone().into()),*];
+                $(list.extend(self.$files.iter().map(|file| file.clone().into()));)?
                 $($crate::plan::option::OptionValue::write(&self.$field, $option, &mut list);)*
                 list
             }

@@ -1,7 +1,7 @@
 //! Outputs that would destroy something: an input of the same command, or a file that no stage wrote.
 
 use crate::export::gltf;
-use crate::io::{ExrImage, HEAD, is_sealed, picture};
+use crate::io::{ExrImage, HEAD, is_sealed, picture, video};
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::Read;
@@ -36,7 +36,7 @@ fn is_foreign(path: &Path) -> Result<bool> {
         }
         start if start.starts_with(b"glTF") => !gltf::is_ours(start),
         start if start.starts_with(&EXR) => ExrImage::read_provenance(path).is_ok_and(|found| found.is_none()),
-        _ => true,
+        _ => !video::is_ours(path).map_err(fail)?,
     })
 }
 
@@ -70,6 +70,7 @@ mod tests {
             file("list.json", b"[]"),
             file("parcels.json", br#"{"checksum": "crc32"}"#),
             at("photograph.exr"),
+            file("holiday.mp4", b"\0\0\0\x20ftypisom"),
         ] {
             assert!(refuse(&kept, none).unwrap_err().to_string().contains("not written by reprobe"), "{}", kept.display());
         }
@@ -77,6 +78,7 @@ mod tests {
             at("new.exr"),
             at("ours.exr"),
             file("cut.exr", &whole[..whole.len() / 2]),
+            file("walk.mp4", b"\0\0\0\x20ftypisom\0\0\0\x17freemade by reprobe"),
             file("empty.exr", b""),
             file("zeros.exr", &[0; 100]),
             file("flipped.exr", &[&[whole[0] ^ 1], &whole[1..]].concat()),

@@ -2,7 +2,7 @@
 
 use super::stages::{
     BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, ExportGltf, ExportProbes, InspectLightfield,
-    InspectTransport, PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
+    InspectTransport, PlaceProbes, Qhmap, Relight, RenderPath, Resmap, Video, View,
 };
 use super::{Context, Outcome, overwrite};
 use crate::Result;
@@ -43,6 +43,10 @@ pub enum Stage {
     InspectLightfield(InspectLightfield),
     /// `inspect-transport`
     InspectTransport(InspectTransport),
+    /// `view`
+    View(View),
+    /// `video`
+    Video(Video),
 }
 
 /// The stages that bake, in the order in which they run.
@@ -76,6 +80,8 @@ macro_rules! with {
             Stage::ExportProbes($s) => $what,
             Stage::InspectLightfield($s) => $what,
             Stage::InspectTransport($s) => $what,
+            Stage::View($s) => $what,
+            Stage::Video($s) => $what,
         }
     };
 }
@@ -102,7 +108,9 @@ from!(
     ExportGltf,
     ExportProbes,
     InspectLightfield,
-    InspectTransport
+    InspectTransport,
+    View,
+    Video
 );
 
 impl Stage {
@@ -127,6 +135,8 @@ impl Stage {
             Self::ExportProbes(s) => of(s, ExportProbes::COMMAND),
             Self::InspectLightfield(s) => of(s, InspectLightfield::COMMAND),
             Self::InspectTransport(s) => of(s, InspectTransport::COMMAND),
+            Self::View(s) => of(s, View::COMMAND),
+            Self::Video(s) => of(s, Video::COMMAND),
         }
     }
 
@@ -162,6 +172,8 @@ impl Stage {
             Self::BakeProbes(s) => [&s.probes, &s.qhmap].into_iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::RenderPath(s) => s.probes.iter().chain(&s.lightmap).chain(&s.curvature).collect(),
             Self::Compare(s) => vec![&s.image, &s.reference],
+            Self::View(s) => s.files.iter().collect(),
+            Self::Video(s) => [&s.frames].into_iter().chain(&s.beside).collect(),
         }
     }
 
@@ -180,7 +192,7 @@ impl Stage {
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),
             Self::InspectTransport(s) => [&s.scene].into_iter().chain(&s.path).collect(),
-            Self::Qhmap(_) | Self::ExportProbes(_) => vec![],
+            Self::Qhmap(_) | Self::ExportProbes(_) | Self::View(_) | Self::Video(_) => vec![],
             Self::Compare(s) => s.second_reference.iter().collect(),
         }
     }
@@ -201,7 +213,7 @@ impl Stage {
     }
 
     fn reads_scene(&self) -> bool {
-        !matches!(self, Self::Qhmap(_) | Self::Compare(_) | Self::ExportProbes(_))
+        !matches!(self, Self::Qhmap(_) | Self::Compare(_) | Self::ExportProbes(_) | Self::View(_) | Self::Video(_))
     }
 
     /// The command and its arguments, as the program takes them.

@@ -19,6 +19,9 @@ pub struct Timings {
     /// What the noise was taken out by; `None` for nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub denoiser: Option<String>,
+    /// Frames a second of the camera path, or of what changes in the scene; `None` where neither says. What `video` reads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fps: Option<f64>,
     /// Scene loading, milliseconds.
     pub load_ms: f64,
     /// Acceleration structures, milliseconds.

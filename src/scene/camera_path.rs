@@ -60,6 +60,12 @@ pub fn load(path: &Path, sensor: Option<&Camera>, unit_scale: f32) -> Result<Vec
     parse(path, &read_text(path)?, sensor, unit_scale)
 }
 
+/// Frames a second that the file names.
+pub fn fps(path: &Path) -> Result<Option<f64>> {
+    let file: PathFile = json::written_by_hand(path, &read_text(path)?)?;
+    Ok(file.fps.filter(|fps| *fps > 0.0 && fps.is_finite()))
+}
+
 fn parse(path: &Path, text: &str, sensor: Option<&Camera>, unit_scale: f32) -> Result<Vec<Camera>> {
     let bad = |message: String| Error::input(path, message);
     let file: PathFile = json::written_by_hand(path, text)?;

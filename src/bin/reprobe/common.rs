@@ -68,6 +68,10 @@ pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
         ("inspect-lightfield", &["device", "seed"]),
         ("inspect-transport", &["device", "seed"]),
         ("info", &["device", "seed"]),
+        ("view", &[&["device", "seed", "threads"][..], &SCENE].concat()),
+        ("video", &[&["device", "seed"][..], &SCENE].concat()),
+        ("completions", &[&["device", "seed", "threads"][..], &SCENE].concat()),
+        ("man", &[&["device", "seed", "threads"][..], &SCENE].concat()),
     ] {
         let hidden: Vec<clap::Arg> =
             cli.get_arguments().filter(|a| idle.contains(&a.get_id().as_str())).map(|a| a.clone().hide(true)).collect();

@@ -10,7 +10,8 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe curvature room/scene.xml -o curvature.exr
-  reprobe info curvature.exr --pictures look/")]
+  reprobe curvature room/scene.xml -o curvature.exr --regularize 30 --no-tessellation
+  reprobe view curvature.exr --layer k1 -o k1.png")]
 pub struct Args {
     /// Scene: Mitsuba XML or JSON, or glTF
     scene: PathBuf,

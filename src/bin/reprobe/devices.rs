@@ -11,6 +11,7 @@ use serde_json::json;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe devices
+  reprobe devices --json
   reprobe resmap room/scene.xml --probes probes.json -o resmap/ --device gpu:llvmpipe")]
 pub struct Args {}
 

@@ -7,6 +7,7 @@ mod bake_probes;
 mod bake_transport;
 mod common;
 mod compare;
+mod completions;
 mod curvature;
 mod devices;
 mod evaluate;
@@ -15,6 +16,7 @@ mod export_probes;
 mod info;
 mod inspect_lightfield;
 mod inspect_transport;
+mod man;
 mod place_probes;
 mod preset;
 mod qhmap;
@@ -23,6 +25,8 @@ mod render_path;
 mod resmap;
 mod run;
 mod terminal;
+mod video;
+mod view;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 use common::Common;
@@ -73,8 +77,12 @@ enum Command {
     InspectTransport(inspect_transport::Args),
     Devices(devices::Args),
     Info(info::Args),
+    View(view::Args),
+    Video(video::Args),
     Run(run::Args),
     Evaluate(evaluate::Args),
+    Completions(completions::Args),
+    Man(man::Args),
 }
 
 fn main() -> ExitCode {
@@ -103,8 +111,13 @@ fn main() -> ExitCode {
 
 /// What was typed; usage errors end the process.
 fn parse() -> Cli {
-    let matches = common::hide_idle(Cli::command()).get_matches_from(joined(std::env::args_os()));
+    let matches = typed().get_matches_from(joined(std::env::args_os()));
     Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())
+}
+
+/// The commands and their options, as they can be typed.
+fn typed() -> clap::Command {
+    common::hide_idle(Cli::command())
 }
 
 /// Words with `--denoise` and what may follow it as one: it stands alone too, and then the next word is not its value, but the scene, say.
@@ -147,6 +160,8 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         Command::ExportProbes(args) => args.stage().into(),
         Command::InspectLightfield(args) => args.stage().into(),
         Command::InspectTransport(args) => args.stage().into(),
+        Command::View(args) => args.stage().into(),
+        Command::Video(args) => args.stage().into(),
         Command::Devices(args) => return devices::run(&args),
         Command::Info(args) => {
             cx.refuse_gpu("info")?;
@@ -154,6 +169,14 @@ fn dispatch(command: Command, cx: &Context) -> anyhow::Result<Outcome> {
         }
         Command::Run(args) => return run::run(&args, cx),
         Command::Evaluate(args) => return evaluate::run(&args, cx),
+        Command::Completions(args) => {
+            cx.refuse_gpu("completions")?;
+            return completions::run(&args, typed());
+        }
+        Command::Man(args) => {
+            cx.refuse_gpu("man")?;
+            return man::run(&args, typed());
+        }
     };
     if !stage.uses_gpu() {
         cx.refuse_gpu(stage.command())?;
@@ -166,7 +189,7 @@ mod tests {
     use super::*;
     use reprobe::plan::stages::{
         BakeLightfield, BakeLightmap, BakeProbes, BakeTransport, Compare, Curvature, ExportGltf, ExportProbes, InspectLightfield,
-        InspectTransport, PlaceProbes, Qhmap, Relight, RenderPath, Resmap,
+        InspectTransport, PlaceProbes, Qhmap, Relight, RenderPath, Resmap, Video, View,
     };
 
     /// Every option of a stage can be typed, and what can be typed reaches the stage.
@@ -189,6 +212,8 @@ mod tests {
             (ExportProbes::COMMAND, ExportProbes::OPTIONS),
             (InspectLightfield::COMMAND, InspectLightfield::OPTIONS),
             (InspectTransport::COMMAND, InspectTransport::OPTIONS),
+            (View::COMMAND, View::OPTIONS),
+            (Video::COMMAND, Video::OPTIONS),
         ] {
             let sub = cli.find_subcommand(command).unwrap_or_else(|| panic!("no subcommand {command}"));
             let mut typed: Vec<String> = sub.get_arguments().filter_map(|a| Some(format!("--{}", a.get_long()?))).collect();
@@ -202,21 +227,47 @@ mod tests {
 
     #[test]
     fn the_command_line_is_well_formed() {
-        common::hide_idle(Cli::command()).debug_assert();
+        typed().debug_assert();
     }
 
     #[test]
     fn help_has_examples_and_the_options_that_do_something() {
-        let mut cli = common::hide_idle(Cli::command());
+        let mut cli = typed();
         cli.build();
         for sub in cli.get_subcommands_mut().filter(|sub| sub.get_name() != "help") {
             let (name, help) = (sub.get_name().to_owned(), sub.render_long_help().to_string());
-            assert!(help.contains("Examples:\n"), "{name}");
             let shows = |option: &str| help.contains(&format!("  {option} ")) || help.contains(&format!(", {option} "));
             let runs_on_gpu = ["resmap", "bake-probes", "bake-lightmap", "render-path", "run", "evaluate"].contains(&&*name);
             assert_eq!(shows("--device"), runs_on_gpu, "{name}");
-            assert_eq!(shows("--unit-scale"), !["qhmap", "compare", "devices"].contains(&&*name), "{name}");
+            let reads_no_scene = ["qhmap", "compare", "devices", "view", "video", "completions", "man"].contains(&&*name);
+            assert_eq!(shows("--unit-scale"), !reads_no_scene, "{name}");
         }
+    }
+
+    /// The lines of a command's examples, those that go on put together, without what is said of them and where they write to.
+    fn examples(after_help: &str) -> Vec<String> {
+        let text = after_help.strip_prefix("Examples:\n").unwrap_or_default().replace("\\\n", " ");
+        let lines = text.lines().filter_map(|line| line.strip_prefix("  "));
+        let typed = |line: &str| line.replace(" > ", "     ").split("     ").next().map(str::to_owned);
+        lines.filter(|line| line.starts_with("reprobe ")).filter_map(typed).collect()
+    }
+
+    #[test]
+    fn every_command_has_two_examples_of_its_own_and_all_can_be_typed() {
+        let mut shown = 0;
+        for sub in typed().get_subcommands() {
+            let name = sub.get_name();
+            let lines = examples(&sub.get_after_help().map(ToString::to_string).unwrap_or_default());
+            let own = lines.iter().filter(|line| line.split_whitespace().nth(1) == Some(name)).count();
+            assert!(own >= 2, "{name}: {own} examples of its own in {lines:?}");
+            shown += lines.len();
+            for line in lines {
+                let words = line.split_whitespace().map(OsString::from);
+                let matches = typed().try_get_matches_from(joined(words)).unwrap_or_else(|e| panic!("{line}: {e}"));
+                Cli::from_arg_matches(&matches).unwrap_or_else(|e| panic!("{line}: {e}"));
+            }
+        }
+        assert!(shown > 60, "{shown}");
     }
 
     #[test]
@@ -230,20 +281,20 @@ mod tests {
             ("scene.xml -o out", None),
         ] {
             let words = ["reprobe", "render-path"].into_iter().chain(words.split(' ')).map(OsString::from);
-            let matches = common::hide_idle(Cli::command()).try_get_matches_from(joined(words)).unwrap();
+            let matches = typed().try_get_matches_from(joined(words)).unwrap();
             let Command::RenderPath(args) = Cli::from_arg_matches(&matches).unwrap().command else { panic!("another command") };
             let stage = args.stage();
             assert_eq!((stage.denoise, stage.scene.to_str()), (expected, Some("scene.xml")));
         }
         let words = ["reprobe", "render-path", "scene.xml", "-o", "out", "--denoise=magic"].map(OsString::from);
-        let refused = common::hide_idle(Cli::command()).try_get_matches_from(joined(words.into_iter())).err().unwrap();
+        let refused = typed().try_get_matches_from(joined(words.into_iter())).err().unwrap();
         assert!(refused.to_string().contains("expected one of oidn, filter"), "{refused}");
     }
 
     #[test]
     fn an_option_that_does_nothing_for_a_command_is_taken_all_the_same() {
         let words = ["reprobe", "qhmap", "resmap", "-o", "qhmap", "--seed", "7", "--device", "cpu"];
-        let matches = common::hide_idle(Cli::command()).try_get_matches_from(words).unwrap();
+        let matches = typed().try_get_matches_from(words).unwrap();
         let cli = Cli::from_arg_matches(&matches).unwrap();
         assert_eq!((cli.common.seed, cli.common.device), (7, Choice::Cpu));
     }

@@ -104,7 +104,7 @@ fn blurred(probe: &Probe, d: Vec3, alpha: f32, size: u32) -> Rgb {
         let k = cos2 * (alpha * alpha - 1.0) + 1.0;
         // D · cos h / (4 v·h), with v along the normal.
         let pdf = alpha * alpha / (PI * k * k) / 4.0;
-        sum += about(frame.to_world(l), (1.0 / (SAMPLES as f32 * pdf)).max(own)) * l.z;
+        sum += about(frame.to_world(l), 1.0 / (SAMPLES as f32 * pdf)) * l.z;
         weight += l.z;
     }
     if weight > 0.0 { sum / weight } else { about(d, own) }

@@ -16,6 +16,8 @@ mod relight;
 mod render_path;
 mod resmap;
 mod set;
+mod video;
+mod view;
 
 pub use bake_lightfield::BakeLightfield;
 pub use bake_lightmap::BakeLightmap;
@@ -32,3 +34,5 @@ pub use qhmap::Qhmap;
 pub use relight::Relight;
 pub use render_path::{Aov, RenderPath};
 pub use resmap::Resmap;
+pub use video::Video;
+pub use view::View;

@@ -19,7 +19,7 @@ use crate::plan::views::{FrameList, views, views_of_changes};
 use crate::plan::{Context, Outcome};
 use crate::probe::file::BakedSet;
 use crate::probe::store::{SET_FILE, set_hash};
-use crate::scene::{Animation, Camera};
+use crate::scene::{Animation, Camera, camera_path};
 use crate::surface::{CurvatureMap, curvature_file};
 use crate::transport::World;
 use crate::view::View;
@@ -254,6 +254,7 @@ impl RenderPath {
             None => views(&world.scene, path, size, frames)?,
             Some(animation) => views_of_changes(&world.scene, path, size, frames, animation.frames())?,
         };
+        timings.fps = path.map(camera_path::fps).transpose()?.flatten().or(animation.as_ref().map(|a| a.fps));
         refuse_parallel(method, &views)?;
         let (parameters, warnings) = (method.for_scene)(parameters, &world.scene)?;
         warnings.iter().for_each(|w| cx.listener.warn(w));

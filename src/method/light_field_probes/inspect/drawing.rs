@@ -163,7 +163,7 @@ fn draw_key(canvas: &mut Canvas, [x, mut y]: [usize; 2], width: usize, way: &Way
 fn draw_map(canvas: &mut Canvas, [x, y]: [usize; 2], field: &LightField, way: &Way, (i, step): (usize, &Step)) {
     let surfels = &field.maps[step.probe].surfels;
     let (n, colour) = (surfels.size, colour_of(i));
-    let (_, texels) = scalar(&surfels.distance);
+    let texels = scalar(&surfels.distance);
     let pixels: Vec<Colour> = (0..EDGE * EDGE).map(|k| texels[k / EDGE * n / EDGE * n + k % EDGE * n / EDGE]).collect();
     let mut map = Canvas { size: [EDGE; 2], pixels };
     let ray = &way.asked.ray;

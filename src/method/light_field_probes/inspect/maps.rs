@@ -1,8 +1,8 @@
 //! A probe's octahedral maps side by side.
 
+use crate::io::ExrImage;
 use crate::io::canvas::{BACKGROUND, Canvas, Colour, INK, LINE};
-use crate::io::picture::{Picture, pictures};
-use crate::io::{ExrImage, Samples};
+use crate::io::picture::{Picture, pictures, usual_exposure};
 
 /// Least edge of a map in the picture, pixels.
 const EDGE: usize = 256;
@@ -12,8 +12,6 @@ const GAP: usize = 8;
 const COLUMNS: usize = 3;
 /// Height of a map's words: a title, and up to three lines of what its colours mean.
 const WORDS: usize = 4 * LINE + 4;
-/// Stops by which irradiance is darkened: by pi, so that it is as bright as a white wall that it falls on.
-const WHITE_WALL: f32 = -1.65;
 /// Layers that are shown, and their titles.
 const SHOWN: [(&str, &str); 5] = [
     ("radiance", "radiance"),
@@ -33,11 +31,7 @@ pub struct Shown {
 
 /// Draws a probe's files, colours `exposure` stops brighter. +Y is in the middle of a map, -Y in its corners, +X at the right, +Z below.
 pub fn draw(title: &str, images: &[ExrImage], exposure: f32) -> (Canvas, Vec<Shown>) {
-    let of = |image: &ExrImage| {
-        let is_irradiance = |(name, _): &(String, Samples)| name.starts_with("irradiance");
-        let less = if image.channels.iter().any(is_irradiance) { WHITE_WALL } else { 0.0 };
-        pictures(image, exposure + less)
-    };
+    let of = |image: &ExrImage| pictures(image, exposure + usual_exposure(image));
     let all: Vec<Picture> = images.iter().flat_map(of).collect();
     let shown: Vec<(&Picture, &str)> =
         SHOWN.iter().filter_map(|(layer, title)| Some((all.iter().find(|p| p.layer == *layer)?, *title))).collect();
