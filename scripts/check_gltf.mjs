@@ -29,12 +29,12 @@ const PAGE = `<!doctype html><body style="margin:0"><script type="importmap">{"i
 <script type="module">
 import * as THREE from "three";
 import { GLTFLoader } from "/three/examples/jsm/loaders/GLTFLoader.js";
-const { width, height, lightmap, look } = OPTIONS;
+const { width, height, lightmap, look } = OPTIONS, SUPERSAMPLE = 4;
 const chunk = THREE.ShaderChunk.lights_fragment_maps, plain = "lightMapTexel.rgb * lightMapIntensity";
 if (!chunk.includes(plain)) throw new Error("three.js decodes light maps in another way than this script knows");
 THREE.ShaderChunk.lights_fragment_maps = chunk.replace(plain, "34.49 * pow(lightMapTexel.a, 2.2) * " + plain);
-const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
-renderer.setSize(width, height); document.body.append(renderer.domElement);
+const renderer = new THREE.WebGLRenderer(), wide = width * SUPERSAMPLE, high = height * SUPERSAMPLE;
+const target = new THREE.WebGLRenderTarget(wide, high, { type: THREE.FloatType });
 const loader = new GLTFLoader(), gltf = await loader.loadAsync("/scene.glb"), scene = gltf.scene, lights = [];
 for (const object of [...scene.children, ...scene.getObjectsByProperty("isMesh", true), ...scene.getObjectsByProperty("isLight", true)]) {
   if (object.isLight) lights.push(object);
@@ -43,6 +43,7 @@ for (const object of [...scene.children, ...scene.getObjectsByProperty("isMesh",
     const material = mesh.material = mesh.material.clone();
     if (lightmap) { material.emissive?.set(0); material.emissiveMap = null; }
     material.aoMap = null;
+    if (material.map) Object.assign(material.map, { minFilter: material.map.magFilter, generateMipmaps: false, needsUpdate: true });
     if (!extension) continue;
     material.lightMap = (await gltf.parser.getDependency("texture", extension.lightMapTexture.index)).clone();
     Object.assign(material.lightMap, { channel: 1, colorSpace: THREE.NoColorSpace, generateMipmaps: false, minFilter: THREE.LinearFilter, needsUpdate: true });
@@ -57,7 +58,21 @@ if (look) {
   camera = new THREE.PerspectiveCamera(fov, aspect, .01, 1000);
   camera.position.set(...look.slice(0, 3)); camera.lookAt(...look.slice(3, 6)); camera.updateMatrixWorld();
 }
+renderer.setRenderTarget(target);
 renderer.render(scene, camera);
+// The mean of each pixel's samples in linear light, clamped last, as our frames have it. Rows come from the bottom.
+const fine = new Float32Array(4 * wide * high), coarse = new ImageData(width, height);
+renderer.readRenderTargetPixels(target, 0, 0, wide, high, fine);
+for (let i = 0; i < width * height * 4; i++) {
+  const x = (i >> 2) % width * SUPERSAMPLE, y = (height - 1 - Math.floor((i >> 2) / width)) * SUPERSAMPLE;
+  let mean = 0;
+  for (let k = 0; k < SUPERSAMPLE ** 2; k++) mean += fine[((y + Math.floor(k / SUPERSAMPLE)) * wide + x + k % SUPERSAMPLE) * 4 + (i & 3)] / SUPERSAMPLE ** 2;
+  mean = Math.min(mean, 1);
+  coarse.data[i] = (i & 3) === 3 ? 255 : Math.round(255 * (mean <= .0031308 ? 12.92 * mean : 1.055 * mean ** (1 / 2.4) - .055));
+}
+const picture = Object.assign(document.createElement("canvas"), { width, height });
+picture.getContext("2d").putImageData(coarse, 0, 0);
+window.picture = picture.toDataURL("image/png");
 window.shown = { calls: renderer.info.render.calls, triangles: renderer.info.render.triangles };
 </script>`;
 
@@ -83,12 +98,13 @@ for (const file of files) {
     const content = path === "/page.html" ? PAGE.replace("OPTIONS", JSON.stringify({ width, height, lightmap: !!options.lightmap, look }))
       : await readFile(path === "/scene.glb" ? file : path.startsWith("/three/") ? join(three, path.slice(7)) : "").catch(() => null);
     response.writeHead(content === null ? 404 : 200, { "content-type": type }).end(content ?? "");
-  }).listen(0, "127.0.0.1");
+  });
+  await new Promise(done => server.listen(0, "127.0.0.1", done));
   page.on("pageerror", e => { failed++; console.log(`  page: ${e.message}`); });
   await page.goto(`http://127.0.0.1:${server.address().port}/page.html`);
   await page.waitForFunction("window.shown", null, { timeout: 120000 });
   console.log("  three.js:", JSON.stringify(await page.evaluate("window.shown")));
-  await writeFile(options.shot, await page.screenshot());
+  await writeFile(options.shot, Buffer.from((await page.evaluate("window.picture")).split(",")[1], "base64"));
   if (options.against) {
     const data = async path => `data:image/png;base64,${(await readFile(path)).toString("base64")}`;
     const rmse = await page.evaluate(async urls => {
