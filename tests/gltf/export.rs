@@ -187,6 +187,37 @@ fn the_light_map_lies_on_the_second_coordinates() {
 }
 
 #[test]
+fn what_is_lit_from_behind_is_turned_round() {
+    let folder = tempfile::tempdir().unwrap();
+    let before = scene(
+        folder.path(),
+        r#"<shape type="rectangle"/><shape type="rectangle"><transform name="to_world"><translate z="3"/></transform></shape>"#,
+    );
+    let atlas = Atlas::build(&before.geometry, &|_| true, &AtlasParams { texel: Some(0.25), ..AtlasParams::default() }).unwrap();
+    let count = (atlas.size[0] * atlas.size[1]) as usize;
+    // The first shape has light before it, the second behind it.
+    let lit = |object: u32| {
+        let mut pixels = vec![Vec3::ZERO; count];
+        for triangle in before.geometry.objects[object as usize].triangles.clone() {
+            let places = atlas.corners(&before.geometry, triangle).unwrap();
+            let (low, high) = places.iter().fold((places[0], places[0]), |(l, h), p| (l.min(*p), h.max(*p)));
+            for (y, x) in (low.y as u32..=high.y as u32).flat_map(|y| (low.x as u32..=high.x as u32).map(move |x| (y, x))) {
+                pixels.get_mut((y * atlas.size[0] + x) as usize).into_iter().for_each(|p| *p = Vec3::ONE);
+            }
+        }
+        pixels
+    };
+    let map = lookup::sides(&before.geometry, &atlas, lit(0), Some(lit(1)));
+    let (after, document, _) = written(&before, Some(&map), folder.path());
+    let normals: Vec<Vec3> = (0..4).map(|t| after.geometry.area_normal(t).normalize()).collect();
+    assert_eq!(normals, [Vec3::Z, Vec3::Z, Vec3::NEG_Z, Vec3::NEG_Z]);
+    assert_eq!(after.geometry.normals[4], Vec3::NEG_Z);
+    let texture =
+        |node: usize| document["nodes"][node]["extensions"]["MX_lightmap"]["lightMapTexture"]["index"].as_u64().unwrap();
+    assert_ne!(texture(0), texture(1));
+}
+
+#[test]
 fn textures_and_their_places_come_back() {
     let folder = tempfile::tempdir().unwrap();
     image::RgbImage::from_fn(4, 2, |x, y| image::Rgb([60 * x as u8, 200 * y as u8, 90]))

@@ -32,7 +32,7 @@ pub struct Exported {
     pub warnings: Vec<String>,
     /// Materials in it.
     pub materials: usize,
-    /// Shapes whose light is the map's `back`, turned round so that viewers light what is seen.
+    /// Triangles whose light is the map's `back`, turned round so that viewers light what is seen.
     pub turned: usize,
 }
 
@@ -58,15 +58,18 @@ pub fn glb(scene: &Scene, lightmap: Option<&LightMap>, provenance: &Value) -> Re
                 written
             }
         };
-        let is_turned = lightmap.is_some_and(|map| shapes::is_lit_from_behind(&scene.geometry, object, map));
-        turned += usize::from(is_turned);
-        let shape = shapes::shape(&scene.geometry, object, lightmap, is_turned);
-        let mesh = shape.write(&mut writer, &of.name, material);
-        let mut node = json!({ "mesh": mesh, "name": of.name });
-        if let Some(maps) = &maps {
-            node["extensions"] = json!({ "MX_lightmap": maps.of(is_turned) });
+        for (triangles, is_turned) in shapes::by_side(&scene.geometry, object, lightmap).iter().zip([false, true]) {
+            if triangles.is_empty() {
+                continue;
+            }
+            turned += if is_turned { triangles.len() } else { 0 };
+            let shape = shapes::shape(&scene.geometry, object, triangles, lightmap, is_turned);
+            let mut node = json!({ "mesh": shape.write(&mut writer, &of.name, material), "name": of.name });
+            if let Some(maps) = &maps {
+                node["extensions"] = json!({ "MX_lightmap": maps.of(is_turned) });
+            }
+            roots.push(writer.push("nodes", node));
         }
-        roots.push(writer.push("nodes", node));
     }
     if let Some(maps) = &maps {
         writer.uses("MX_lightmap");

@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
 use std::collections::HashMap;
 
-/// How many times more light on its back makes a shape one that is seen from there.
+/// How many times more light on its back makes a triangle one that is seen from there.
 const BEHIND: f32 = 4.0;
 
 /// Attributes by vertex.
@@ -21,23 +21,21 @@ pub struct Shape {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Whether a shape's light is that of its back.
-pub fn is_lit_from_behind(geometry: &Geometry, object: usize, map: &LightMap) -> bool {
-    let middle = Vec2::splat(1.0 / 3.0);
-    let side = |back: bool| {
-        let of = geometry.objects[object].triangles.clone();
-        of.map(|t| luminance(map.lookup(t, middle, back)) * geometry.area_normal(t).length()).sum::<f32>()
-    };
-    map.back.is_some() && side(true) > BEHIND * side(false)
+/// A shape's triangles: those that are lit from before, or from nowhere, and those that are lit from behind.
+pub fn by_side(geometry: &Geometry, object: usize, map: Option<&LightMap>) -> [Vec<u32>; 2] {
+    let side = |triangle: u32, back: bool| map.map_or(0.0, |map| luminance(map.lookup(triangle, Vec2::splat(1.0 / 3.0), back)));
+    let is_turned = |triangle: &u32| side(*triangle, true) > BEHIND * side(*triangle, false);
+    let (turned, upright) = geometry.objects[object].triangles.clone().partition(is_turned);
+    [upright, turned]
 }
 
-/// A shape's triangles. Vertices are split where faces are flat and where charts of the light map part; `turned` shows the back.
-pub fn shape(geometry: &Geometry, object: usize, map: Option<&LightMap>, turned: bool) -> Shape {
+/// Some of a shape's triangles. Vertices are split where faces are flat and where charts of the light map part; `turned` shows the back.
+pub fn shape(geometry: &Geometry, object: usize, triangles: &[u32], map: Option<&LightMap>, turned: bool) -> Shape {
     let of = &geometry.objects[object];
     let mut shape =
         Shape { positions: Vec::new(), normals: Vec::new(), uvs: Vec::new(), atlas: Vec::new(), triangles: Vec::new() };
     let mut numbers: HashMap<(u32, [u32; 2], [u32; 3]), u32> = HashMap::new();
-    for triangle in of.triangles.clone() {
+    for &triangle in triangles {
         let corners = geometry.triangles[triangle as usize];
         let flat = geometry.area_normal(triangle).try_normalize().unwrap_or(Vec3::Y);
         let places = map.and_then(|map| map.places(triangle)).unwrap_or([Vec2::ZERO; 3]);
