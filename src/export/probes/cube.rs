@@ -12,7 +12,9 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 
 /// Samples of a lobe.
-const SAMPLES: u32 = 128;
+const SAMPLES: u32 = 256;
+/// Texels that a linear lookup spreads over, about.
+const SPREAD: f32 = 3.0;
 /// Texels along an edge of a cube of diffuse light.
 const DIFFUSE: u32 = 32;
 
@@ -83,7 +85,7 @@ pub fn direction(face: u32, place: Vec2) -> Vec3 {
 /// Radiance about `d` under the lobe of a mirror of this alpha, for texels of a cube so many along an edge.
 fn blurred(probe: &Probe, d: Vec3, alpha: f32, size: u32) -> Rgb {
     let texel = 4.0 * PI / (probe.light.size * probe.light.size) as f32;
-    let about = |d: Vec3, solid_angle: f32| probe.light.about(d, (0.5 * (solid_angle / texel).log2()).max(0.0));
+    let about = |d: Vec3, solid_angle: f32| probe.light.about(d, (0.5 * (solid_angle / (SPREAD * texel)).log2()).max(0.0));
     let own = 4.0 * PI / (6 * size * size) as f32;
     if alpha == 0.0 {
         return about(d, own);
