@@ -106,6 +106,8 @@ AccountingStorageType=accounting_storage/slurmdbd
 AccountingStorageHost=127.0.0.1
 AccountingStoragePort=$((PORT + 1))
 AccountingStoragePass=$dir/munge.sock
+# What a job is for, by Snakemake.
+AccountingStoreFlags=job_comment
 JobRequeue=1
 ReturnToService=2
 SlurmdTimeout=20
