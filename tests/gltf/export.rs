@@ -187,34 +187,41 @@ fn the_light_map_lies_on_the_second_coordinates() {
 }
 
 #[test]
-fn what_is_lit_from_behind_is_turned_round() {
+fn what_is_lit_on_both_sides_is_there_for_each() {
     let folder = tempfile::tempdir().unwrap();
+    let two_sided = r#"<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>"#;
     let before = scene(
         folder.path(),
-        r#"<shape type="rectangle"/><shape type="rectangle"><transform name="to_world"><translate z="3"/></transform></shape>"#,
+        &format!(
+            r#"<shape type="rectangle">{two_sided}</shape><shape type="rectangle">{two_sided}<transform name="to_world"><translate z="3"/></transform></shape>
+               <emitter type="constant"/>"#
+        ),
     );
     let atlas = Atlas::build(&before.geometry, &|_| true, &AtlasParams { texel: Some(0.25), ..AtlasParams::default() }).unwrap();
     let count = (atlas.size[0] * atlas.size[1]) as usize;
-    // The first shape has light before it, the second behind it.
-    let lit = |object: u32| {
-        let mut pixels = vec![Vec3::ZERO; count];
-        for triangle in before.geometry.objects[object as usize].triangles.clone() {
-            let places = atlas.corners(&before.geometry, triangle).unwrap();
-            let (low, high) = places.iter().fold((places[0], places[0]), |(l, h), p| (l.min(*p), h.max(*p)));
-            for (y, x) in (low.y as u32..=high.y as u32).flat_map(|y| (low.x as u32..=high.x as u32).map(move |x| (y, x))) {
-                pixels.get_mut((y * atlas.size[0] + x) as usize).into_iter().for_each(|p| *p = Vec3::ONE);
-            }
+    // All fronts are lit, and the back of the second shape.
+    let mut back = vec![Vec3::ZERO; count];
+    for triangle in before.geometry.objects[1].triangles.clone() {
+        let places = atlas.corners(&before.geometry, triangle).unwrap();
+        let (low, high) = places.iter().fold((places[0], places[0]), |(l, h), p| (l.min(*p), h.max(*p)));
+        for (y, x) in (low.y as u32..=high.y as u32).flat_map(|y| (low.x as u32..=high.x as u32).map(move |x| (y, x))) {
+            back.get_mut((y * atlas.size[0] + x) as usize).into_iter().for_each(|p| *p = Vec3::ONE);
         }
-        pixels
-    };
-    let map = lookup::sides(&before.geometry, &atlas, lit(0), Some(lit(1)));
+    }
+    let map = lookup::sides(&before.geometry, &atlas, vec![Vec3::ONE; count], Some(back));
     let (after, document, _) = written(&before, Some(&map), folder.path());
-    let normals: Vec<Vec3> = (0..4).map(|t| after.geometry.area_normal(t).normalize()).collect();
-    assert_eq!(normals, [Vec3::Z, Vec3::Z, Vec3::NEG_Z, Vec3::NEG_Z]);
-    assert_eq!(after.geometry.normals[4], Vec3::NEG_Z);
-    let texture =
-        |node: usize| document["nodes"][node]["extensions"]["MX_lightmap"]["lightMapTexture"]["index"].as_u64().unwrap();
-    assert_ne!(texture(0), texture(1));
+    let normals: Vec<Vec3> = (0..6).map(|t| after.geometry.area_normal(t).normalize()).collect();
+    assert_eq!(normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::Z, Vec3::NEG_Z, Vec3::NEG_Z]);
+    assert_eq!(after.geometry.objects.iter().map(|o| o.triangles.len()).collect::<Vec<_>>(), [2, 2, 2]);
+    assert_eq!(after.geometry.normals[8], Vec3::NEG_Z);
+    let node = |i: usize| &document["nodes"][i];
+    let texture = |i: usize| node(i)["extensions"]["MX_lightmap"]["lightMapTexture"]["index"].as_u64().unwrap();
+    assert!(texture(0) == texture(1) && texture(1) != texture(2));
+    let is_double_sided = |i: usize| {
+        let primitive = &document["meshes"][node(i)["mesh"].as_u64().unwrap() as usize]["primitives"][0];
+        document["materials"][primitive["material"].as_u64().unwrap() as usize]["doubleSided"].as_bool().unwrap()
+    };
+    assert_eq!([0, 1, 2].map(is_double_sided), [true, false, false]);
 }
 
 #[test]

@@ -7,7 +7,8 @@ use crate::base::math::{Basis, Rgb};
 use crate::material::bsdf::{Bsdf, Conductor, Principled};
 use crate::material::image::Image;
 use crate::material::texture::{Bitmap, Wrap};
-use crate::material::{Material, Opacity, Surface, Texture};
+use crate::material::{Opacity, Surface, Texture};
+use crate::scene::{Emitter, Scene};
 use glam::{Affine2, Vec2, Vec3};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
@@ -28,19 +29,23 @@ struct Look {
     /// Share of light that goes through, and whether there is an inside.
     glass: Option<(Texture, bool)>,
     normals: Option<Texture>,
-    both_sides: bool,
 }
 
-/// Writes a material with the light that its shape emits; returns its number.
+/// Writes a material of the scene with the light of an emitter, to be seen from both sides or from one; returns its number.
 pub fn material(
     writer: &mut Writer,
-    material: &Material,
-    radiance: Option<&Texture>,
+    scene: &Scene,
+    (material, emitter, both_sides): (u32, Option<u32>, bool),
     warnings: &mut Vec<String>,
 ) -> Result<usize> {
+    let material = &scene.materials[material as usize];
+    let radiance = match emitter.and_then(|e| scene.emitters.get(e as usize)) {
+        Some(Emitter::Area { radiance, .. }) => Some(radiance),
+        _ => None,
+    };
     let mut odd = |what: &str| warnings.push(format!("material \"{}\": {what}", material.name));
     let look = look(&material.bsdf, &mut odd);
-    let mut json = json!({ "name": material.name, "doubleSided": look.both_sides });
+    let mut json = json!({ "name": material.name, "doubleSided": both_sides });
     let coverage = coverage(material.opacity.as_ref(), &mut odd);
     let mut pbr = Map::new();
     let (factor, texture) = base(writer, &look, coverage.as_ref())?;
@@ -93,7 +98,6 @@ fn look(bsdf: &Bsdf, odd: &mut dyn FnMut(&str)) -> Look {
         ior,
         glass: None,
         normals: None,
-        both_sides: false,
     };
     let metal = |metal: &Conductor, roughness: Texture| {
         let f0 = reflectance(metal);
@@ -114,7 +118,7 @@ fn look(bsdf: &Bsdf, odd: &mut dyn FnMut(&str)) -> Look {
         Bsdf::Dielectric(d) => glass(d.params.int_ior / d.params.ext_ior, white(0.0), true),
         Bsdf::ThinDielectric(d) => glass(d.params.int_ior / d.params.ext_ior, white(0.0), false),
         Bsdf::RoughDielectric(d) => glass(d.params.int_ior / d.params.ext_ior, root(&d.alpha_u), true),
-        Bsdf::TwoSided(sides) => Look { both_sides: true, ..look(&sides.front, odd) },
+        Bsdf::TwoSided(sides) => look(&sides.front, odd),
         Bsdf::NormalMap(map) => Look { normals: Some(map.texture.clone()), ..look(&map.nested, odd) },
         Bsdf::BumpMap(map) => {
             odd("its bumps are left out");

@@ -32,8 +32,8 @@ pub struct Exported {
     pub warnings: Vec<String>,
     /// Materials in it.
     pub materials: usize,
-    /// Triangles whose light is the map's `back`, turned round so that viewers light what is seen.
-    pub turned: usize,
+    /// Triangles whose backs are lit: they are in it twice, once for each side.
+    pub behind: usize,
 }
 
 /// Writes a scene, and the light map that was baked for it.
@@ -41,32 +41,33 @@ pub fn glb(scene: &Scene, lightmap: Option<&LightMap>, provenance: &Value) -> Re
     let mut warnings = Vec::new();
     let mut writer = Writer::default();
     let maps = lightmap.map(|map| Maps::write(&mut writer, map)).transpose()?;
-    let mut materials = BTreeMap::new();
-    let (mut roots, mut turned) = (Vec::new(), 0);
-    for object in 0..scene.geometry.objects.len() {
-        let of = &scene.geometry.objects[object];
-        let key = (of.material, of.emitter);
+    let (mut materials, mut roots, mut behind) = (BTreeMap::new(), Vec::new(), 0);
+    for (object, of) in scene.geometry.objects.iter().enumerate() {
+        let bsdf = &scene.materials[of.material as usize].bsdf;
+        let backs = match lightmap {
+            Some(map) if bsdf.is_two_sided() => shapes::lit_behind(&scene.geometry, object, map),
+            _ => Vec::new(),
+        };
+        behind += backs.len();
+        // A texel lights both sides of what it lies on: where each has its own, each is a shape that is seen from before alone.
+        let both_sides = bsdf.is_two_sided() && backs.is_empty();
+        let key = (of.material, of.emitter, both_sides);
         let material = match materials.get(&key) {
             Some(material) => *material,
             None => {
-                let radiance = of.emitter.and_then(|e| match scene.emitters.get(e as usize) {
-                    Some(Emitter::Area { radiance, .. }) => Some(radiance),
-                    _ => None,
-                });
-                let written = looks::material(&mut writer, &scene.materials[of.material as usize], radiance, &mut warnings)?;
+                let written = looks::material(&mut writer, scene, key, &mut warnings)?;
                 materials.insert(key, written);
                 written
             }
         };
-        for (triangles, is_turned) in shapes::by_side(&scene.geometry, object, lightmap).iter().zip([false, true]) {
+        for (triangles, is_back) in [(of.triangles.clone().collect(), false), (backs, true)] {
             if triangles.is_empty() {
                 continue;
             }
-            turned += if is_turned { triangles.len() } else { 0 };
-            let shape = shapes::shape(&scene.geometry, object, triangles, lightmap, is_turned);
+            let shape = shapes::shape(&scene.geometry, object, &triangles, lightmap, is_back);
             let mut node = json!({ "mesh": shape.write(&mut writer, &of.name, material), "name": of.name });
             if let Some(maps) = &maps {
-                node["extensions"] = json!({ "MX_lightmap": maps.of(is_turned) });
+                node["extensions"] = json!({ "MX_lightmap": maps.of(is_back) });
             }
             roots.push(writer.push("nodes", node));
         }
@@ -88,7 +89,7 @@ pub fn glb(scene: &Scene, lightmap: Option<&LightMap>, provenance: &Value) -> Re
     if !lights.is_empty() {
         extensions.insert("KHR_lights_punctual".into(), json!({ "lights": lights }));
     }
-    Ok(Exported { bytes: writer.finish(asset, Value::Object(extensions))?, warnings, materials: count, turned })
+    Ok(Exported { bytes: writer.finish(asset, Value::Object(extensions))?, warnings, materials: count, behind })
 }
 
 /// Whether a file that begins like this was written by [`glb`].

@@ -1,15 +1,12 @@
 //! Triangles of one shape with both sets of texture coordinates.
 
 use super::writer::Writer;
-use crate::base::math::luminance;
+use crate::base::math::Rgb;
 use crate::lightmap::LightMap;
 use crate::scene::Geometry;
 use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
 use std::collections::HashMap;
-
-/// How many times more light on its back makes a triangle one that is seen from there.
-const BEHIND: f32 = 4.0;
 
 /// Attributes by vertex.
 pub struct Shape {
@@ -21,12 +18,10 @@ pub struct Shape {
     triangles: Vec<[u32; 3]>,
 }
 
-/// A shape's triangles: those that are lit from before, or from nowhere, and those that are lit from behind.
-pub fn by_side(geometry: &Geometry, object: usize, map: Option<&LightMap>) -> [Vec<u32>; 2] {
-    let side = |triangle: u32, back: bool| map.map_or(0.0, |map| luminance(map.lookup(triangle, Vec2::splat(1.0 / 3.0), back)));
-    let is_turned = |triangle: &u32| side(*triangle, true) > BEHIND * side(*triangle, false);
-    let (turned, upright) = geometry.objects[object].triangles.clone().partition(is_turned);
-    [upright, turned]
+/// Those of a shape's triangles whose backs the light map lights.
+pub fn lit_behind(geometry: &Geometry, object: usize, map: &LightMap) -> Vec<u32> {
+    let is_lit = |triangle: &u32| map.lookup(*triangle, Vec2::splat(1.0 / 3.0), true) != Rgb::ZERO;
+    geometry.objects[object].triangles.clone().filter(is_lit).collect()
 }
 
 /// Some of a shape's triangles. Vertices are split where faces are flat and where charts of the light map part; `turned` shows the back.

@@ -54,7 +54,7 @@ impl ExportGltf {
         exported.warnings.iter().for_each(|warning| cx.listener.warn(&format!("{}: {warning}", self.scene.display())));
         atomic::write(&self.output, &exported.bytes)?;
         let (shapes, triangles) = (scene.geometry.objects.len(), scene.geometry.triangles.len());
-        let gltf::Exported { bytes, materials, turned, .. } = exported;
+        let gltf::Exported { bytes, materials, behind, .. } = exported;
         let (megabytes, seconds) = (bytes.len() as f64 / 1e6, clock());
         let light = match &map {
             Some(map) => format!(", a light map of {} x {} texels", map.size[0], map.size[1]),
@@ -66,7 +66,7 @@ impl ExportGltf {
                 "{output}: {shapes} shapes of {triangles} triangles, {materials} materials{light}; {megabytes:.1} MB in {seconds:.1} s"
             ),
             figures: json!({
-                "shapes": shapes, "triangles": triangles, "materials": materials, "turned": turned, "bytes": bytes.len(), "seconds": seconds
+                "shapes": shapes, "triangles": triangles, "materials": materials, "behind": behind, "bytes": bytes.len(), "seconds": seconds
             }),
             ..Outcome::default()
         })
