@@ -64,6 +64,8 @@ pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
         ("qhmap", &[&["device", "seed"][..], &SCENE].concat()),
         ("curvature", &["device", "seed"]),
         ("compare", &[&["device", "seed"][..], &SCENE].concat()),
+        ("export-gltf", &["device", "seed", "threads"]),
+        ("export-probes", &[&["device", "seed"][..], &SCENE].concat()),
         ("devices", &[&["device", "seed", "threads"][..], &SCENE].concat()),
         ("inspect-lightfield", &["device", "seed"]),
         ("inspect-transport", &["device", "seed"]),

@@ -239,7 +239,8 @@ mod tests {
             let shows = |option: &str| help.contains(&format!("  {option} ")) || help.contains(&format!(", {option} "));
             let runs_on_gpu = ["resmap", "bake-probes", "bake-lightmap", "render-path", "run", "evaluate"].contains(&&*name);
             assert_eq!(shows("--device"), runs_on_gpu, "{name}");
-            let reads_no_scene = ["qhmap", "compare", "devices", "view", "video", "completions", "man"].contains(&&*name);
+            let reads_no_scene =
+                ["qhmap", "compare", "export-probes", "devices", "view", "video", "completions", "man"].contains(&&*name);
             assert_eq!(shows("--unit-scale"), !reads_no_scene, "{name}");
         }
     }
