@@ -50,7 +50,9 @@ daemon() {
     echo $! >"$dir/$name.pid"
 }
 
-is_running() { [ -f "$dir/$1.pid" ] && kill -0 "$(cat "$dir/$1.pid")" 2>/dev/null; }
+# A killed daemon may stay as a zombie, where nobody waits for it.
+is_alive() { case $(ps -o state= -p "$1") in '' | Z*) return 1 ;; esac; }
+is_running() { [ -f "$dir/$1.pid" ] && is_alive "$(cat "$dir/$1.pid")"; }
 
 write_configuration() {
     local password memory
@@ -155,7 +157,7 @@ start() {
     wait_for slurmctld scontrol ping
     start_node 1
     start_node 2
-    wait_for "a node" sh -c '[ "$(sinfo -h -N -t idle -o %N | sort -u | wc -l)" = 2 ]'
+    wait_for "a node, or both," sh -c '[ "$(sinfo -h -N -t idle -o %N | sort -u | wc -l)" = 2 ]'
     sinfo -N
     # Snakemake's executor takes SLURM_CONF away from the srun within its jobs.
     mkdir -p "$dir/bin"
@@ -177,10 +179,10 @@ stop() {
         pid=$(cat "$dir/$name.pid")
         kill "$pid" 2>/dev/null || true
         for _ in $(seq 60); do
-            kill -0 "$pid" 2>/dev/null || break
+            is_alive "$pid" || break
             sleep 0.5
         done
-        ! kill -0 "$pid" 2>/dev/null || kill -9 "$pid"
+        ! is_alive "$pid" || kill -9 "$pid"
         rm -f "$dir/$name.pid"
     done
 }

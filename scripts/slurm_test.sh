@@ -84,7 +84,7 @@ say "node2 killed with its jobs $jobs- $(finished) probes were finished"
 if ! wait $snakemake; then
     # The executor (2.8.0) excludes the node of a job that waits for its second run from all later jobs, by the name of "None assigned": these
     # cannot be submitted then. Called again, Snakemake goes on where it stopped.
-    [ "$again" = slurm ] && grep -q 'exclude=None assigned' "$work/farm.log" || give_up farm
+    if [ "$again" != slurm ] || ! grep -q 'exclude=None assigned' "$work/farm.log"; then give_up farm; fi
     say "called again"
     workflow "${farm[@]}" || give_up farm
 fi
@@ -95,7 +95,10 @@ sacct -X -D -n -P -S "$since" -o JobID,State,NodeList,Elapsed,Comment >"$work/sa
 lost=$(grep -c NODE_FAIL "$work/sacct.txt" || true)
 twice=$(cut -d'|' -f1 "$work/sacct.txt" | sort | uniq -d | wc -l)
 echo "jobs: $(cut -d'|' -f1 "$work/sacct.txt" | sort -u | wc -l); lost with their node: $lost"
-echo "requeued by Slurm: $twice; submitted again by Snakemake: $(grep -c 'Trying to restart job' "$work/farm.log" || true)"
+case $again in
+snakemake) echo "submitted again by Snakemake: $(grep -c 'Trying to restart job' "$work/farm.log" || true)" ;;
+slurm) echo "requeued by Slurm: $twice" ;;
+esac
 for job in $jobs; do grep "^$job|" "$work/sacct.txt"; done
 
 compared=0 differing=0
