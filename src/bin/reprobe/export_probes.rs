@@ -10,6 +10,7 @@ use std::path::PathBuf;
 /// NNNN.ktx2 is a cube of reflections whose levels are blurred by GGX, level l of L for a roughness of l / (L - 1); NNNN_diffuse.ktx2 has
 /// irradiance over π. Probes in a grid also make volume.ktx2, ambient cubes as Bevy's IrradianceVolume reads them. probes.json says
 /// where all of it stands, and has the diffuse light in spherical harmonics of the first order (1, y, z, x). Half floats, linear.
+/// Lamps and windows that emit light are dark in the cubes, as in the probes: engines add their light by themselves.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe place-probes room/scene.xml --path room/path.json --grid 4x3x4 -o probes.json
