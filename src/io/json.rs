@@ -56,7 +56,13 @@ mod tests {
         let value: Value = parse(&path, &text).unwrap();
         assert_eq!(value["a"][2], 7);
         assert_eq!(parse::<Value>(&path, &value.to_string()).unwrap(), value);
-        for (from, to) in [("7", "6"), ("text", "test"), ("\"c\"", "\"d\""), ("\"checksum\": \"", "\"checksum\": \"f")] {
+        for (from, to) in [
+            ("7", "6"),
+            ("text", "test"),
+            ("\"c\"", "\"d\""),
+            ("\"checksum\": \"", "\"checksum\": \"f"),
+            ("checksum", "chucksum"),
+        ] {
             let message = parse::<Value>(&path, &text.replacen(from, to, 1)).unwrap_err().to_string();
             assert!(message.contains("has changed since it was written"), "{from}: {message}");
         }

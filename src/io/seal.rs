@@ -13,6 +13,8 @@ const NAME: &str = "checksum";
 const BLANK: [u8; 64] = [b'0'; 64];
 /// What stands before the digits in an EXR file.
 const BEFORE: &[u8] = br#"{"checksum":""#;
+/// What follows the digits there: the first member of a provenance.
+const AFTER: &[u8] = br#"","version":"#;
 /// Bytes of a file within which its head ends.
 pub const HEAD: usize = 1 << 16;
 
@@ -32,7 +34,17 @@ pub fn seal(bytes: &mut [u8]) {
 
 /// Whether an EXR file is as it was written; `None` where it has no checksum.
 pub fn holds(bytes: &[u8]) -> Option<bool> {
-    place(bytes).map(|at| bytes[at..at + BLANK.len()] == *sum(bytes, at).as_bytes())
+    match place(bytes) {
+        Some(at) => Some(bytes[at..at + BLANK.len()] == *sum(bytes, at).as_bytes()),
+        None => is_misnamed(bytes).then_some(false),
+    }
+}
+
+/// Whether a checksum stands in an EXR file's head whose name has changed: digits, and after them what follows ours.
+fn is_misnamed(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(HEAD)];
+    let before = |at: usize| Some(&head[at.checked_sub(BLANK.len())?..at]);
+    find(head, AFTER).and_then(before).is_some_and(|digits| digits.iter().all(u8::is_ascii_hexdigit))
 }
 
 /// An error where an EXR file has changed since it was written. One without a checksum may be anybody's.
@@ -75,8 +87,13 @@ pub fn sealed(members: Map<String, Value>) -> Map<String, Value> {
 
 /// An error where an object has changed since it was [`sealed`].
 pub fn check_object(path: &Path, mut object: Map<String, Value>) -> Result<()> {
+    // The first member of an object that was sealed, by whatever name a change has left it.
+    let is_sum =
+        |value: &Value| value.as_str().is_some_and(|s| s.len() == BLANK.len() && s.bytes().all(|b| b.is_ascii_hexdigit()));
+    let is_misnamed = object.values().next().is_some_and(is_sum);
     match object.shift_remove(NAME) {
         Some(found) if found != sum_of(&object) => Err(changed(path)),
+        None if is_misnamed => Err(changed(path)),
         _ => Ok(()),
     }
 }
