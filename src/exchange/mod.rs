@@ -10,6 +10,9 @@ use crate::Result;
 use crate::scene::Scene;
 use std::path::Path;
 
+/// Most triangles of a scene whose meshes stand in it as copies: some 10 GB.
+const MAX_TRIANGLES: usize = 50_000_000;
+
 /// What the command line says about loading.
 #[derive(Debug, Clone, Default)]
 pub struct LoadOptions {

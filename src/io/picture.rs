@@ -14,10 +14,15 @@ const PNG_HEAD: usize = 8 + 25;
 const OURS: &[u8] = b"tEXtSoftware\0reprobe";
 
 /// Three bytes a pixel as a PNG file.
-pub fn png(pixels: &[u8], [width, height]: [usize; 2]) -> Result<Vec<u8>> {
+pub fn png(pixels: &[u8], size: [usize; 2]) -> Result<Vec<u8>> {
+    encoded(pixels, size, ExtendedColorType::Rgb8)
+}
+
+/// Pixels of any kind as a PNG file.
+pub(crate) fn encoded(pixels: &[u8], [width, height]: [usize; 2], kind: ExtendedColorType) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(pixels, width as u32, height as u32, ExtendedColorType::Rgb8)
+        .write_image(pixels, width as u32, height as u32, kind)
         .map_err(|e| Error::Request(format!("PNG of {width} x {height}: {e}")))?;
     Ok(bytes)
 }
@@ -122,7 +127,8 @@ pub fn ranges(layer: &Layer) -> Option<[[f32; 2]; 3]> {
     matches!(layer.kind, Kind::Scalar | Kind::Vector).then(|| percentiles(&layer.planes()))
 }
 
-fn byte(x: f32) -> u8 {
+/// A number in [0, 1] as a byte.
+pub(crate) fn byte(x: f32) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 

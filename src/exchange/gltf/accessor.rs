@@ -23,17 +23,7 @@ impl File {
     pub fn numbers<const N: usize>(&self, index: Index<Accessor>, what: &str) -> Result<Vec<[f32; N]>> {
         let accessor = self.get(index, "accessor")?;
         let layout = self.layout(index, accessor, what, N)?;
-        let number = number(layout.component, accessor.normalized);
-        let width = layout.component.size();
-        let element = |bytes: &[u8]| std::array::from_fn(|i| number(&bytes[i * width..]));
-        let mut elements = match accessor.buffer_view {
-            Some(_) => layout.elements().map(element).collect(),
-            None => vec![[0.0; N]; layout.count],
-        };
-        for (i, bytes) in self.sparse(accessor, &layout, what)? {
-            elements[i] = element(bytes);
-        }
-        Ok(elements)
+        self.elements(accessor, &layout, what, number(layout.component, accessor.normalized))
     }
 
     /// Whole numbers, one an element.
@@ -53,13 +43,24 @@ impl File {
                 return Err(self.error(format!("{what}: accessor {} is of {other:?}: expected whole numbers", index.value())));
             }
         };
+        self.elements(accessor, &layout, what, read)
+    }
+
+    /// All elements, sparse ones in their places; `read` takes one number of them.
+    fn elements<T: Copy + Default, const N: usize>(
+        &self,
+        accessor: &Accessor,
+        layout: &Layout,
+        what: &str,
+        read: fn(&[u8]) -> T,
+    ) -> Result<Vec<[T; N]>> {
         let width = layout.component.size();
         let element = |bytes: &[u8]| std::array::from_fn(|i| read(&bytes[i * width..]));
         let mut elements = match accessor.buffer_view {
             Some(_) => layout.elements().map(element).collect(),
-            None => vec![[0; N]; layout.count],
+            None => vec![[T::default(); N]; layout.count],
         };
-        for (i, bytes) in self.sparse(accessor, &layout, what)? {
+        for (i, bytes) in self.sparse(accessor, layout, what)? {
             elements[i] = element(bytes);
         }
         Ok(elements)

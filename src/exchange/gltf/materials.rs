@@ -28,12 +28,33 @@ pub struct Look {
     pub opacity: Option<Opacity>,
     /// Radiance that leaves its front.
     pub emission: Option<Texture>,
-    /// Tangent-space normals, where texture coordinates are not mirrored, and where they are.
-    pub normals: Option<[Texture; 2]>,
+    /// Tangent-space normals.
+    pub normals: Option<Normals>,
     /// The texture coordinates that its textures lie on.
     pub set: u32,
     /// Whether colours of vertices count.
     pub plain: bool,
+}
+
+/// A normal map and the factor on its slopes.
+#[derive(Debug, Clone)]
+pub struct Normals {
+    texture: Texture,
+    scale: f32,
+}
+
+impl Normals {
+    /// The map for texture coordinates as they are, or for mirrored ones, whose second axis our frames turn round.
+    fn texture(&self, mirrored: bool) -> Texture {
+        match &self.texture {
+            Texture::Bitmap(bitmap) if mirrored || self.scale != 1.0 => {
+                let signs = Vec3::new(self.scale, if mirrored { -self.scale } else { self.scale }, 1.0);
+                let image = bitmap.image.changed(|p| (p * 2.0 - 1.0) * signs * 0.5 + 0.5);
+                Texture::Bitmap(Bitmap { image: Arc::new(image), ..bitmap.clone() })
+            }
+            texture => texture.clone(),
+        }
+    }
 }
 
 /// A scattering model whose colour may be the mesh's.
@@ -59,9 +80,7 @@ impl Look {
     /// The scattering model: seen from both sides, as modelling programs show it, but where light goes in.
     pub fn bsdf(&self, mirrored: bool, vertex_colors: Option<Texture>) -> Result<Bsdf> {
         let tilted = |bsdf: Bsdf| match &self.normals {
-            Some(normals) => {
-                Bsdf::NormalMap(NormalMap { texture: normals[usize::from(mirrored)].clone(), nested: Box::new(bsdf) })
-            }
+            Some(normals) => Bsdf::NormalMap(NormalMap { texture: normals.texture(mirrored), nested: Box::new(bsdf) }),
             None => bsdf,
         };
         let both_sides = |bsdf: Bsdf| Bsdf::TwoSided(TwoSided { front: Box::new(bsdf.clone()), back: Box::new(bsdf) });
@@ -213,18 +232,13 @@ impl Reader<'_> {
         Ok((emission.mean().max_element() > 0.0).then_some(emission))
     }
 
-    /// Normals for texture coordinates as they are, and for mirrored ones, whose second axis our frames turn round.
-    fn normals(&mut self, place: Place, scale: f32) -> Result<[Texture; 2]> {
-        let flat = Rgb::new(0.5, 0.5, 1.0);
-        let Texture::Bitmap(bitmap) = self.textures.get(self.file, place, Take::Linear, Rgb::ONE)? else {
-            return Ok([Texture::Constant(flat), Texture::Constant(flat)]);
+    fn normals(&mut self, place: Place, scale: f32) -> Result<Normals> {
+        let texture = match self.textures.get(self.file, place, Take::Linear, Rgb::ONE)? {
+            // Flat until its image is read.
+            Texture::Constant(_) => Texture::Constant(Rgb::new(0.5, 0.5, 1.0)),
+            texture => texture,
         };
-        let turned = |signs: Vec3| {
-            let image = bitmap.image.changed(|p| (p * 2.0 - 1.0) * signs * 0.5 + 0.5);
-            Texture::Bitmap(Bitmap { image: Arc::new(image), ..bitmap.clone() })
-        };
-        let upright = if scale == 1.0 { Texture::Bitmap(bitmap.clone()) } else { turned(Vec3::new(scale, scale, 1.0)) };
-        Ok([upright, turned(Vec3::new(scale, -scale, 1.0))])
+        Ok(Normals { texture, scale })
     }
 
     fn color(&mut self, place: Option<Place>, factor: Rgb) -> Result<Texture> {

@@ -10,7 +10,7 @@ mod meshes;
 mod nodes;
 mod textures;
 
-use super::{LoadOptions, finish};
+use super::{LoadOptions, MAX_TRIANGLES, finish};
 use crate::base::math::Rgb;
 use crate::material::texture::Attribute;
 use crate::material::{Material, Texture};
@@ -26,9 +26,6 @@ use meshes::Part;
 use std::path::Path;
 use std::sync::Arc;
 use textures::Textures;
-
-/// Most triangles, those of a mesh counted as often as it stands somewhere: some 10 GB.
-const MAX_TRIANGLES: u64 = 50_000_000;
 
 /// Loads a glTF file.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
@@ -107,7 +104,7 @@ impl Builder<'_> {
             root.meshes.iter().map(|mesh| mesh.primitives.iter().map(|p| meshes::triangle_count(root, p)).sum()).collect();
         let of_node = |i: &usize| root.nodes[*i].mesh.and_then(|mesh| of_mesh.get(mesh.value())).copied().unwrap_or(0);
         let all = shown.iter().map(of_node).fold(0, u64::saturating_add);
-        match all > MAX_TRIANGLES {
+        match all > MAX_TRIANGLES as u64 {
             true => Err(self.file.error(format!("the scene has {all} triangles, expected at most {MAX_TRIANGLES}"))),
             false => Ok(()),
         }

@@ -145,12 +145,11 @@ fn look(bsdf: &Bsdf, odd: &mut dyn FnMut(&str)) -> Look {
 
 /// What the diffuse lobe sends out of a base colour, relative to it: what a coating keeps back.
 fn tint(bsdf: &Bsdf, base: &Texture) -> Rgb {
-    let mean = base.mean();
     let out = bsdf.diffuse_out(&flat(), VIEW);
     // Textures are asked at one place there, so that their value is known here, too.
     let there = base.eval(flat().uv);
     let share = |out: f32, there: f32| if there > 0.0 { out / there } else { 1.0 };
-    if mean == Rgb::ZERO { Rgb::ONE } else { Rgb::new(share(out.x, there.x), share(out.y, there.y), share(out.z, there.z)) }
+    Rgb::new(share(out.x, there.x), share(out.y, there.y), share(out.z, there.z))
 }
 
 /// Where metal and glass take their share of the colour, viewers do the same.
@@ -216,27 +215,25 @@ fn base(writer: &mut Writer, look: &Look, coverage: Option<&Texture>) -> Result<
         let [r, g, b] = c.clamp(Rgb::ZERO, Rgb::ONE).to_array();
         [r, g, b, alpha.clamp(0.0, 1.0)]
     };
-    let constant = match coverage {
-        Some(Texture::Constant(c)) => c.x,
-        _ => 1.0,
+    let (constant, covering) = match coverage {
+        Some(Texture::Constant(c)) => (c.x, None),
+        Some(Texture::Bitmap(bitmap)) => (1.0, Some(bitmap)),
+        _ => (1.0, None),
     };
-    let image = match coverage {
-        Some(Texture::Bitmap(b)) => Some(b.image.map(|x| x * b.scale)),
-        _ => None,
-    };
-    match (as_bitmap(&look.base), image) {
-        (Some(bitmap), image) => {
-            let png = pixels::color(&bitmap.image, image.as_ref())?;
-            Ok((color(look.tint * bitmap.scale, constant), Some(info(writer, &bitmap, png))))
+    let alpha = covering.map(|b| b.image.map(|x| x * b.scale));
+    Ok(match (as_bitmap(&look.base), covering) {
+        (Some(bitmap), _) => {
+            let png = pixels::color(&bitmap.image, alpha.as_ref())?;
+            (color(look.tint * bitmap.scale, constant), Some(info(writer, &bitmap, png)))
         }
-        (None, Some(image)) => {
-            let Some(Texture::Bitmap(bitmap)) = coverage else { return Ok((color(look.tint, constant), None)) };
-            let white = Image::new(image.width, image.height, vec![Rgb::ONE; image.width * image.height]);
-            let png = pixels::color(&white, Some(&image))?;
-            Ok((color(look.base.mean() * look.tint, 1.0), Some(info(writer, bitmap, png))))
+        (None, Some(bitmap)) => {
+            let Image { width, height, .. } = *bitmap.image;
+            let white = Image::new(width, height, vec![Rgb::ONE; width * height]);
+            let png = pixels::color(&white, alpha.as_ref())?;
+            (color(look.base.mean() * look.tint, constant), Some(info(writer, bitmap, png)))
         }
-        (None, None) => Ok((color(look.base.mean() * look.tint, constant), None)),
-    }
+        (None, None) => (color(look.base.mean() * look.tint, constant), None),
+    })
 }
 
 /// A checkerboard of constants as an image of four pixels.

@@ -1,11 +1,10 @@
 //! Images as PNG files.
 
+use crate::Result;
 use crate::base::math::Rgb;
-use crate::io::picture::srgb;
+use crate::io::picture::{byte, encoded as png, srgb};
 use crate::material::image::Image;
-use crate::{Error, Result};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use image::ExtendedColorType;
 
 /// What RGBM stands for at most: the factor of `MX_lightmap`'s decoder.
 pub const RGBM_RANGE: f32 = 34.49;
@@ -15,12 +14,12 @@ const RGBM_POWER: f32 = 2.2;
 /// A texture's colours, sRGB-encoded, with coverage where there is one: a value in [0, 1] a pixel.
 pub fn color(image: &Image, coverage: Option<&Image>) -> Result<Vec<u8>> {
     let size = [image.width, image.height];
-    let encoded = |x: f32| byte(srgb(x.clamp(0.0, 1.0)));
+    let display = |x: f32| byte(srgb(x));
     match coverage {
-        None => png(&each(size, |x, y| image.pixel(x, y).to_array().map(encoded)), size, ExtendedColorType::Rgb8),
+        None => png(&each(size, |x, y| image.pixel(x, y).to_array().map(display)), size, ExtendedColorType::Rgb8),
         Some(coverage) => {
             let pixel = |x, y| {
-                let [r, g, b] = image.pixel(x, y).to_array().map(encoded);
+                let [r, g, b] = image.pixel(x, y).to_array().map(display);
                 [r, g, b, byte(at(coverage, x, y, size))]
             };
             png(&each(size, pixel), size, ExtendedColorType::Rgba8)
@@ -69,18 +68,6 @@ fn at(image: &Image, x: usize, y: usize, [width, height]: [usize; 2]) -> f32 {
 
 fn each<const N: usize>([width, height]: [usize; 2], pixel: impl Fn(usize, usize) -> [u8; N]) -> Vec<u8> {
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| pixel(x, y)).collect()
-}
-
-fn byte(x: f32) -> u8 {
-    (x.clamp(0.0, 1.0) * 255.0).round() as u8
-}
-
-fn png(bytes: &[u8], [width, height]: [usize; 2], color: ExtendedColorType) -> Result<Vec<u8>> {
-    let mut file = Vec::new();
-    PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive)
-        .write_image(bytes, width as u32, height as u32, color)
-        .map_err(|e| Error::Request(format!("PNG of {width} x {height}: {e}")))?;
-    Ok(file)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ pub mod volume;
 
 use crate::base::math::Rgb;
 use crate::method::light_field_probes::probe::Light;
+use crate::method::radiance_probes::harmonics::Harmonics;
 use crate::probe::octahedral::{middle, solid_angle, taps};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -34,14 +35,12 @@ impl Around {
 
     /// The same in the first two bands of real spherical harmonics, in the order 1, y, z, x: coefficients of the irradiance over π.
     pub fn harmonics(&self) -> [Rgb; 4] {
-        let basis = |d: Vec3| {
-            [0.5 * PI.sqrt().recip(), 0.5 * (3.0 / PI).sqrt() * d.y, 0.5 * (3.0 / PI).sqrt() * d.z, 0.5 * (3.0 / PI).sqrt() * d.x]
-        };
+        let basis = Harmonics::new(1);
         let n = self.size;
         let (mut sums, mut all) = ([Rgb::ZERO; 4], 0.0);
         for i in 0..n * n {
             let omega = solid_angle(i % n, i / n, n);
-            for (sum, y) in sums.iter_mut().zip(basis(middle(i, n))) {
+            for (sum, y) in sums.iter_mut().zip(basis.at(middle(i, n))) {
                 *sum += self.irradiance[i] * (FRAC_1_PI * y * omega);
             }
             all += omega;

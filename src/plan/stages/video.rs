@@ -2,10 +2,10 @@
 
 use super::view::{STOPS, check_range, layer, refuse_idle};
 use crate::base::named::within;
+use crate::io::ExrImage;
 use crate::io::layer::{Kind, layers, most_telling};
 use crate::io::picture::{self, Look, Picture};
 use crate::io::video::{Ffmpeg, Format, Video as Encoder};
-use crate::io::{ExrImage, atomic};
 use crate::plan::option::{List, stage};
 use crate::plan::timings::Timings;
 use crate::plan::{Context, Outcome};
@@ -67,7 +67,6 @@ impl Video {
     /// Reads the frames in order, draws them, and has them encoded.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
-        atomic::sweep(&self.output);
         let frames = self.numbers(cx)?;
         let ffmpeg = Ffmpeg::find()?;
         let shot = self.shot(&frames[0].1)?;

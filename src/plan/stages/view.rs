@@ -1,11 +1,11 @@
 //! `view`.
 
 use crate::base::named::within;
+use crate::io::ExrImage;
 use crate::io::canvas::{Canvas, Colour};
 use crate::io::layer::{IMAGE, Kind, Layer, layers, most_telling, named};
 use crate::io::picture::{self, Look, Picture};
 use crate::io::sheet::{self, Cell, MOST_PIXELS};
-use crate::io::{ExrImage, atomic};
 use crate::plan::option::{List, stage};
 use crate::plan::{Context, Outcome};
 use crate::{Error, Result};
@@ -59,7 +59,6 @@ impl View {
     /// Reads, draws, writes.
     pub fn run(&self, _: &Context) -> Result<Outcome> {
         self.check()?;
-        atomic::sweep(&self.output);
         let drawn: Vec<Vec<Shown>> = self.files.iter().map(|file| self.draw(file)).collect::<Result<_>>()?;
         let shown: Vec<Shown> = drawn.into_iter().flatten().collect();
         refuse_idle(self.exposure.is_some(), self.range.is_some(), shown.iter().map(|s| s.picture.kind))?;

@@ -3,14 +3,12 @@
 //! Ours: instances are copies. Mitsuba keeps one tree a group; here each of a group's triangles is in the scene as often as the group is.
 
 use super::Builder;
+use crate::exchange::MAX_TRIANGLES;
 use crate::exchange::mitsuba::params::Params;
 use crate::exchange::mitsuba::tree::{Kind, MAX_DEPTH, Node, Param, Value};
 use crate::{Error, Result};
 use glam::DMat4;
 use std::collections::BTreeMap;
-
-/// Most triangles that instances may add, of the files of their groups: some 10 GB.
-const MAX_TRIANGLES: usize = 50_000_000;
 
 /// Most shapes in groups, which could multiply without end by referring to groups.
 pub(super) const MAX_SHAPES: usize = 1_000_000;
