@@ -5,10 +5,11 @@ use super::provenance::hash_of;
 use super::{ExrImage, Provenance};
 use crate::Result;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// `--shard I/N`: items I, I + N, I + 2N, ...
+/// `--shard I/N`: items I, I + N, I + 2N, ..., or a run of neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     index: u32,
@@ -19,6 +20,12 @@ impl Shard {
     /// Whether item `i` is this shard's.
     pub fn has(&self, i: usize) -> bool {
         i % self.count as usize == self.index as usize
+    }
+
+    /// The I-th of N runs of `items` that follow one another, as equal as they can be.
+    pub fn run(&self, items: usize) -> Range<usize> {
+        let at = |i: u32| items * i as usize / self.count as usize;
+        at(self.index)..at(self.index + 1)
     }
 }
 
@@ -129,6 +136,16 @@ mod tests {
         assert_eq!(run(Some("0/2")), (Done { made: 0, kept: 4, missing: 1 }, 0));
         assert_eq!(run(Some("1/2")), (Done { made: 1, kept: 4, missing: 0 }, 1));
         assert_eq!(run(None), (Done { made: 0, kept: 5, missing: 0 }, 2));
+    }
+
+    #[test]
+    fn runs_of_shards_follow_one_another_and_leave_nothing_out() {
+        for (items, count) in [(0, 1), (1, 3), (7, 3), (120, 16), (5, 5)] {
+            let runs: Vec<_> = (0..count).map(|index| Shard { index, count }.run(items)).collect();
+            assert_eq!(runs.iter().cloned().flatten().collect::<Vec<_>>(), (0..items).collect::<Vec<_>>());
+            let lengths = || runs.iter().map(ExactSizeIterator::len);
+            assert!(lengths().max().unwrap() - lengths().min().unwrap() <= 1, "{runs:?}");
+        }
     }
 
     #[test]

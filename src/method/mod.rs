@@ -62,7 +62,7 @@ pub struct Method {
     pub transmissive: bool,
     /// Whether it has cameras of parallel rays.
     pub orthographic: bool,
-    /// Whether a frame may depend on the one before it, so that a path is rendered as a whole.
+    /// Whether a frame may depend on the one before it: it does where it, on its own, has unserved pixels.
     pub sequential: bool,
     /// Its parameters, checked, from the options.
     pub parameters: fn(&Options) -> Result<Value>,
@@ -268,6 +268,9 @@ pub trait Renderer {
     /// Renders a view; `next` is the one after it, where there is one. Methods without samples take no notice of their number. Advances
     /// `progress` by the view's rows.
     fn frame(&mut self, view: &View, next: Option<&View>, samples: u32, progress: &dyn Progress) -> Result<Frame>;
+
+    /// Lets the next frame be the first of a path, for methods whose frames may depend on the one before.
+    fn forget(&mut self) {}
 
     /// The GPU that frames are made on, and whether its own clock times their passes; `None` for the CPU.
     fn gpu(&self) -> Option<(&str, bool)> {

@@ -5,8 +5,9 @@ use super::timings::{FrameTimings, Timings};
 use super::{Context, Outcome};
 use crate::Result;
 use crate::base::clock::timed;
-use crate::base::progress::Silent;
-use crate::io::jobs::is_finished;
+use crate::base::progress::{Progress, Silent};
+use crate::io::jobs::{Done, Shard, is_finished};
+use crate::io::provenance::hash_of;
 use crate::io::{ExrImage, Provenance, json};
 use crate::method::{Frame, Method, Renderer, Setup};
 use crate::scene::Camera;
@@ -29,13 +30,15 @@ pub struct Frames<'a> {
     pub provenance: Provenance,
     /// Their folder.
     pub output: &'a Path,
+    /// A run of them, which this run renders alone.
+    pub shard: Option<Shard>,
     /// How long they may take, where samples are chosen by that.
     pub budget: Option<Budget>,
     /// Makes the renderer, once there is something to render.
     pub make: &'a dyn Fn() -> Result<Box<dyn Renderer + 'a>>,
 }
 
-/// Renders the views that are not finished, with the sample count that is given or that the budget allows.
+/// Renders the views that are not finished, of one shard or all, with the sample count that is given or that the budget allows.
 pub fn render(frames: &Frames, cx: &Context, mut timings: Timings) -> Result<Outcome> {
     let mut renderer = None;
     timings.samples = frames.method.count(frames.setup.parameters);
@@ -48,22 +51,28 @@ pub fn render(frames: &Frames, cx: &Context, mut timings: Timings) -> Result<Out
     }
     let samples = timings.samples.unwrap_or(1);
     let parameters = frames.method.with_samples(frames.setup.parameters, samples);
-    let provenance: Vec<Provenance> = frames.setup.views.iter().map(|view| frames.provenance_of(view, &parameters)).collect();
-    let mut kept: Vec<bool> =
-        frames.setup.views.iter().zip(&provenance).map(|(view, p)| is_finished(&frames.output.join(name(view)), p)).collect();
-    if frames.method.sequential && kept.contains(&false) {
-        kept.fill(false);
-    }
-    let progress = cx.progress();
     let views = frames.setup.views;
+    let mine = frames.shard.map_or(0..views.len(), |shard| shard.run(views.len()));
+    let (mut last, mut missing) = (None, 0);
+    let progress = cx.progress();
     progress.start(frames.method.name, views.iter().map(|v| u64::from(v.camera.size[1])).sum());
-    for (i, ((view, provenance), kept)) in views.iter().zip(provenance).zip(kept).enumerate() {
+    for (i, (view, provenance)) in views.iter().zip(frames.provenance(&parameters)).enumerate() {
+        let kept = is_finished(&frames.output.join(name(view)), &provenance);
         let mut times = FrameTimings { name: name(view), kept, ..FrameTimings::default() };
-        if kept {
+        if kept || !mine.contains(&i) {
             progress.advance(view.camera.size[1].into());
-        } else {
+        }
+        if !kept && !mine.contains(&i) {
+            missing += 1;
+            continue;
+        }
+        if !kept {
             let renderer = made(&mut renderer, frames, &mut timings)?;
-            let frame = renderer.frame(view, views.get(i + 1), samples, progress)?;
+            let frame = match frames.method.sequential && (last.is_none() || last != i.checked_sub(1)) {
+                false => renderer.frame(view, views.get(i + 1), samples, progress)?,
+                true => after_those_before(renderer, views, i, samples, progress)?,
+            };
+            last = Some(i);
             timings.note_probes(renderer.probe_bytes());
             times.passes(&frame.passes);
             times.unserved_fraction = frame.unserved.map(|n| n as f64 / frames.sub_pixels(view));
@@ -78,7 +87,34 @@ pub fn render(frames: &Frames, cx: &Context, mut timings: Timings) -> Result<Out
         timings.frames.push(times);
     }
     progress.finish();
-    finish(timings, frames.output)
+    finish(timings, missing, frames.output)
+}
+
+/// View `i` of a method whose frames may depend on those before them, rendered after as many of these as matter: none where every
+/// pixel is served, since a pixel that is not takes its colour from the frame before.
+fn after_those_before(
+    renderer: &mut dyn Renderer,
+    views: &[View],
+    i: usize,
+    samples: u32,
+    progress: &dyn Progress,
+) -> Result<Frame> {
+    let mut first = i;
+    loop {
+        renderer.forget();
+        let frame = renderer.frame(&views[first], views.get(first + 1), samples, if first == i { progress } else { &Silent })?;
+        if first == i && (i == 0 || frame.unserved == Some(0)) {
+            return Ok(frame);
+        }
+        if first == 0 || frame.unserved == Some(0) {
+            break;
+        }
+        first -= 1;
+    }
+    for between in first + 1..i {
+        renderer.frame(&views[between], views.get(between + 1), samples, &Silent)?;
+    }
+    renderer.frame(&views[i], views.get(i + 1), samples, &Silent)
 }
 
 /// The renderer, made when it is first needed.
@@ -117,6 +153,22 @@ fn choose_samples(views: &[View], renderer: &mut dyn Renderer, budget: &Budget) 
 }
 
 impl Frames<'_> {
+    /// Where each view's frame comes from; of a method whose frames may depend on those before them, that of these, too.
+    fn provenance(&self, parameters: &Value) -> Vec<Provenance> {
+        let mut before = None;
+        let mut of = |view| {
+            let mut provenance = self.provenance_of(view, parameters);
+            if self.method.sequential {
+                if let Some(before) = before.take() {
+                    provenance.parameters["before"] = Value::String(before);
+                }
+                before = Some(hash_of(provenance.parameters.to_string().as_bytes()));
+            }
+            provenance
+        };
+        self.setup.views.iter().map(&mut of).collect()
+    }
+
     fn provenance_of(&self, view: &View, parameters: &Value) -> Provenance {
         let mut parameters = json!({
             "method": self.method.name, "frame": view.frame, "aov": self.setup.inspect, "camera": describe(&view.camera),
@@ -174,19 +226,21 @@ fn describe(camera: &Camera) -> Value {
 }
 
 /// Writes `timings.json` and sums up the run.
-fn finish(mut timings: Timings, output: &Path) -> Result<Outcome> {
+fn finish(mut timings: Timings, missing: usize, output: &Path) -> Result<Outcome> {
     timings.finish(&output.join("timings.json"));
     json::write(&output.join("timings.json"), &timings)?;
     let kept = timings.frames.iter().filter(|f| f.kept).count();
     let count = timings.frames.len();
+    let rest = Done { made: count - kept, kept, missing }.rest(" frames");
     let mean: f64 = timings.mean_ms.values().sum();
     let out = output.display();
     let summary = match kept {
-        k if k == count => format!("{count} frames in {out} were finished already"),
-        0 => format!("{count} frames in {out}, {mean:.0} ms a frame"),
-        _ => format!("{count} frames in {out}, {kept} of them finished already, {mean:.0} ms a frame"),
+        k if k == count => format!("{count} frames in {out} were finished already{rest}"),
+        0 => format!("{count} frames in {out}, {mean:.0} ms a frame{rest}"),
+        _ => format!("{count} frames in {out}, {kept} of them finished already, {mean:.0} ms a frame{rest}"),
     };
-    let figures = serde_json::to_value(&timings).map_err(|e| crate::Error::Request(e.to_string()))?;
+    let mut figures = serde_json::to_value(&timings).map_err(|e| crate::Error::Request(e.to_string()))?;
+    figures["missing"] = missing.into();
     Ok(Outcome { summary, figures, check_failed: false })
 }
 

@@ -1,5 +1,6 @@
 //! `reprobe qhmap`.
 
+use reprobe::io::jobs::Shard;
 use reprobe::method::glossy_probes::qhmap::QhmapParams;
 use reprobe::plan::option::Size;
 use reprobe::plan::stages::Qhmap;
@@ -28,12 +29,15 @@ pub struct Args {
     /// Plain lat-long maps, whatever the resolution maps ask for
     #[arg(long, conflicts_with = "epsilon")]
     lat_long: bool,
+    /// Make maps I, I+N, I+2N, ... only; the shard that completes them marks the folder as complete
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
 }
 
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> Qhmap {
-        let Self { resmap, output, size, epsilon, lat_long } = self;
-        Qhmap { resmap, output, size: Some(size), epsilon, lat_long }
+        let Self { resmap, output, size, epsilon, lat_long, shard } = self;
+        Qhmap { resmap, output, size: Some(size), epsilon, lat_long, shard }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::common::parse_bytes;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use reprobe::io::jobs::Shard;
 use reprobe::method::{FilterChoice, LayerChoice, METHODS};
 use reprobe::plan::option::Size;
 use reprobe::plan::stages::{Aov, RenderPath};
@@ -16,7 +17,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   reprobe render-path room/scene.xml --path room/path.json --probes probes/ --lightmap lightmap.exr --curvature curvature.exr -o frames/
   reprobe render-path room/scene.xml --path room/path.json --probes probes/ --lightmap lightmap.exr --curvature curvature.exr --set rays.per_pixel=4 --denoise -o joined/
-  reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 256 -o reference/
+  reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 256 --shard 0/4 -o reference/
   reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 4 --denoise oidn -o denoised/
   reprobe render-path room/scene.xml --path room/path.json --method lightmap-rt --lightmap lightmap.exr --match-time frames/ -o rays/
   reprobe render-path room/scene.xml --lights lights.json --method path-trace --spp 64 -o evening/
@@ -49,6 +50,9 @@ pub struct Args {
     /// Auxiliary layers (all): the first hit's, and the buffers of glossy-probes' passes
     #[arg(long, value_name = "LAYERS")]
     aov: Option<Aov>,
+    /// Render one of N runs of frames only, the I-th from 0, into the folder of the whole
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["budget_ms", "match_time"])]
+    shard: Option<Shard>,
     #[arg(long, value_name = "LIGHTS.json", help = used_by("lights", "lights, materials and objects that change from frame to frame, see below"))]
     lights: Option<PathBuf>,
     #[arg(long, value_name = "DIR", help = used_by("probes", "the baked probes"))]
@@ -139,6 +143,7 @@ impl Args {
             paper: self.paper,
             set: self.set,
             aov: self.aov,
+            shard: self.shard,
             output: self.output,
         }
     }

@@ -1,5 +1,6 @@
 //! `reprobe resmap`.
 
+use reprobe::io::jobs::Shard;
 use reprobe::method::glossy_probes::resmap::{ALPHA_HALF, ResmapParams};
 use reprobe::plan::option::Size;
 use reprobe::plan::stages::Resmap;
@@ -44,12 +45,16 @@ pub struct Args {
     /// The paper's text in every choice
     #[arg(long)]
     paper: bool,
+    /// Make maps I, I+N, I+2N, ... only; the shard that completes them marks the folder as complete
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
 }
 
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> Resmap {
-        let Self { scene, probes, output, size, dct_size, frequency_exponent, blur_sigma, facing_min, alpha_half, paper } = self;
+        let Self { scene, probes, output, size, dct_size, frequency_exponent, blur_sigma, facing_min, alpha_half, paper, shard } =
+            self;
         Resmap {
             scene,
             probes,
@@ -61,6 +66,7 @@ impl Args {
             facing_min: Some(facing_min),
             alpha_half,
             paper,
+            shard,
         }
     }
 }

@@ -100,6 +100,11 @@ impl<'a> Renderer<'a> {
         }
     }
 
+    /// Lets the next frame be the first of a path.
+    pub fn forget(&mut self) {
+        self.previous = None;
+    }
+
     /// Renders the next frame of a path.
     pub fn frame(&mut self, camera: &Camera, probes: &mut ProbeStore<Served>) -> Result<Reprojected> {
         let n = self.params.supersample;

@@ -154,6 +154,10 @@ impl Renderer for WithProbes<'_, OnCpu<'_>> {
         WithProbes::frame(self, frame, view)
     }
 
+    fn forget(&mut self) {
+        self.renderer.forget();
+    }
+
     fn probe_bytes(&self) -> [u64; 2] {
         [self.probes.resident_bytes() as u64, 0]
     }
@@ -179,6 +183,10 @@ impl Renderer for WithProbes<'_, OnGpu<'_>> {
 
     fn gpu(&self) -> Option<(&str, bool)> {
         Some((self.renderer.device(), self.renderer.has_clock()))
+    }
+
+    fn forget(&mut self) {
+        self.renderer.forget();
     }
 
     fn probe_bytes(&self) -> [u64; 2] {

@@ -3,7 +3,7 @@
 use super::set::fill;
 use crate::base::clock::seconds;
 use crate::io::Provenance;
-use crate::io::jobs::Done;
+use crate::io::jobs::{Done, Shard};
 use crate::io::provenance::hash_file;
 use crate::method::glossy_probes::qhmap::{QhmapParams, parameter_map};
 use crate::method::glossy_probes::quasi_harmonic::Solver;
@@ -31,6 +31,8 @@ stage! {
         "--epsilon" epsilon: Option<f32>,
         /// Plain lat-long maps.
         "--lat-long" lat_long: bool,
+        /// Make this shard's maps only.
+        "--shard" shard: Option<Shard>,
         /// Folder for the maps.
         "--output" output: PathBuf,
     }
@@ -87,11 +89,11 @@ impl Qhmap {
             map.save(&self.output, i, &set.provenance)
         };
         let files = |i| map_paths(&self.output, i).to_vec();
-        let Done { kept, .. } = fill(&self.output, &set, files, cx.progress(), || Solver::new(from.size), make)?;
-        Ok(self.outcome(&set, kept, tally.into_inner().unwrap_or_else(PoisonError::into_inner), clock()))
+        let done = fill(&self.output, (&set, self.shard), files, cx.progress(), || Solver::new(from.size), make)?;
+        Ok(self.outcome(&set, done, tally.into_inner().unwrap_or_else(PoisonError::into_inner), clock()))
     }
 
-    fn outcome(&self, set: &ProbeSet, kept: usize, tally: Tally, seconds: f64) -> Outcome {
+    fn outcome(&self, set: &ProbeSet, done: Done, tally: Tally, seconds: f64) -> Outcome {
         let Tally { mut correlation, raised } = tally;
         correlation.sort_by_key(|c| c.0);
         // None where all maps were kept from before.
@@ -104,10 +106,11 @@ impl Qhmap {
         };
         let warning = if raised > 0 { format!(", {raised} with a larger epsilon, lest quads flip") } else { String::new() };
         let (out, count) = (self.output.display(), set.count);
+        let (kept, rest) = (done.kept, done.rest(""));
         Outcome {
-            summary: format!("{out}: {count} maps of {w} x {h}, {kept} kept from before{follows}{warning}, {seconds:.1} s"),
+            summary: format!("{out}: {count} maps of {w} x {h}, {kept} kept from before{follows}{warning}, {seconds:.1} s{rest}"),
             figures: json!({
-                "count": count, "kept": kept, "size": set.size, "correlation": mean, "correlation_least": least,
+                "count": count, "kept": kept, "missing": done.missing, "size": set.size, "correlation": mean, "correlation_least": least,
                 "epsilon_raised": raised, "seconds": seconds,
             }),
             ..Outcome::default()

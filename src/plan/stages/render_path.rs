@@ -4,6 +4,7 @@ use crate::base::clock::timed;
 use crate::base::named::words;
 use crate::gpu::camera;
 use crate::io::Provenance;
+use crate::io::jobs::Shard;
 use crate::io::provenance::hash_file;
 use crate::lightmap::LightMap;
 use crate::method::diffuse::Joined;
@@ -92,6 +93,8 @@ stage! {
         "--set" set: Vec<String>,
         /// Auxiliary layers.
         "--aov" aov: Option<Aov>,
+        /// Render this shard's frames only.
+        "--shard" shard: Option<Shard>,
         /// Folder for the frames.
         "--output" output: PathBuf,
     }
@@ -183,6 +186,11 @@ impl RenderPath {
         let budgets = [self.budget_ms.is_some(), self.match_time.is_some(), self.spp.is_some(), self.samples.is_some()];
         if budgets.into_iter().filter(|given| *given).count() > 1 {
             return Err(Error::Request("--budget-ms, --match-time, --spp, --samples: expected one of them".into()));
+        }
+        if self.shard.is_some() && (self.budget_ms.is_some() || self.match_time.is_some()) {
+            let message =
+                "--shard: every shard would choose samples of its own for --budget-ms or --match-time; give their number";
+            return Err(Error::Request(message.into()));
         }
         budget::check(self.budget_ms)?;
         let options = Options {
@@ -277,7 +285,7 @@ impl RenderPath {
             gpu_memory: self.gpu_memory.unwrap_or(GPU_MEMORY),
         };
         let make = || make(cx, method, &setup);
-        let frames = Frames { method, setup: &setup, provenance, output: &self.output, budget, make: &make };
+        let frames = Frames { method, setup: &setup, provenance, output: &self.output, shard: self.shard, budget, make: &make };
         render(&frames, cx, timings)
     }
 

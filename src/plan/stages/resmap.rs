@@ -4,6 +4,7 @@ use super::set::fill;
 use crate::base::clock::seconds;
 use crate::gpu::{GpuScene, RayTracer};
 use crate::io::Provenance;
+use crate::io::jobs::Shard;
 use crate::io::provenance::hash_file;
 use crate::method::glossy_probes::resmap::{ALPHA_HALF, ResmapParams, Smoothness, resolution_map};
 use crate::method::glossy_probes::seen::SeenBuffers;
@@ -11,7 +12,7 @@ use crate::plan::option::{Size, stage};
 use crate::plan::{Context, Outcome};
 use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, numbered};
-use crate::{Error, Result, io::jobs::Done};
+use crate::{Error, Result};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -41,6 +42,8 @@ stage! {
         "--alpha-half" alpha_half: Option<f32>,
         /// The paper's text in every choice.
         "--paper" paper: bool,
+        /// Make this shard's maps only.
+        "--shard" shard: Option<Shard>,
         /// Folder for the maps.
         "--output" output: PathBuf,
     }
@@ -98,7 +101,7 @@ impl Resmap {
             map.image(&seen).with_provenance(set.provenance.clone()).write_uncompressed(&numbered(&self.output, i))
         };
         let files = |i| vec![numbered(&self.output, i)];
-        let Done { kept, .. } = fill(&self.output, &set, files, cx.progress(), || Ok(()), make)?;
+        let done = fill(&self.output, (&set, self.shard), files, cx.progress(), || Ok(()), make)?;
         let device = tracer.as_ref().map_or("cpu", |t| t.device());
         // None where all maps were kept from before.
         let (texels, glossy) = (texels.into_inner(), glossy.into_inner());
@@ -106,10 +109,11 @@ impl Resmap {
         let [w, h] = params.size;
         let seen = share.map_or_else(String::new, |s| format!(", {:.0} % of their texels glossy", s * 100.0));
         let (out, count, seconds) = (self.output.display(), set.count, clock());
+        let (kept, rest) = (done.kept, done.rest(""));
         Ok(Outcome {
-            summary: format!("{out}: {count} maps of {w} x {h}, {kept} kept from before{seen}, {seconds:.1} s on {device}"),
+            summary: format!("{out}: {count} maps of {w} x {h}, {kept} kept from before{seen}, {seconds:.1} s on {device}{rest}"),
             figures: json!({
-                "count": count, "kept": kept, "size": params.size, "glossy_share": share, "device": device, "seconds": seconds,
+                "count": count, "kept": kept, "missing": done.missing, "size": params.size, "glossy_share": share, "device": device, "seconds": seconds,
             }),
             ..Outcome::default()
         })

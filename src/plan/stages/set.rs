@@ -2,17 +2,18 @@
 
 use crate::Result;
 use crate::base::progress::Progress;
-use crate::io::jobs::{Done, complete, is_finished, touch};
+use crate::io::jobs::{Done, Shard, complete, is_finished, touch};
 use crate::probe::set::ProbeSet;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Makes all items of `set` whose `files` are not all in `folder`, whole, by `make(state, index)`, and then marks it as complete.
+/// Makes those items of `set`, of one shard or all, whose `files` are not all in `folder`, whole, by `make(state, index)`, and marks
+/// the set as complete once none is missing.
 /// Each thread takes a state that nobody else uses, made by `state` when there is none.
 pub fn fill<S: Send>(
     folder: &Path,
-    set: &ProbeSet,
+    (set, shard): (&ProbeSet, Option<Shard>),
     files: impl Fn(usize) -> Vec<PathBuf> + Sync,
     progress: &dyn Progress,
     state: impl Fn() -> Result<S> + Sync,
@@ -43,5 +44,5 @@ pub fn fill<S: Send>(
         }
         set.write(folder)
     };
-    complete(&items, None, &is_kept, make_all, seal)
+    complete(&items, shard, &is_kept, make_all, seal)
 }

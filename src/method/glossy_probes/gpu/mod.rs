@@ -150,6 +150,11 @@ impl<'a> Renderer<'a> {
         })
     }
 
+    /// Lets the next frame be the first of a path.
+    pub fn forget(&mut self) {
+        self.target.iter_mut().for_each(|target| target.last_camera = None);
+    }
+
     /// The device's name.
     pub fn device(&self) -> &str {
         &self.gpu.adapter.name
