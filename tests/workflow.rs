@@ -167,8 +167,8 @@ fn shards_of_make_write_the_files_of_the_whole() {
     let sharded = ["OUT=sharded", "SHARDS=2", "-j2"];
     let ran = commands(&f, &sharded);
     // Each shard, and the run that completes them.
-    for stage in ["bake-lightmap", "bake-probes"] {
-        assert_eq!(ran.iter().filter(|name| *name == stage).count(), 3, "{ran:?}");
+    for (stage, count) in [("bake-lightmap", 3), ("bake-probes", 3), ("render-path", 6)] {
+        assert_eq!(ran.iter().filter(|name| *name == stage).count(), count, "{ran:?}");
     }
     assert!(images(&f.at("out")) == images(&f.at("sharded")));
     f.success("compare out/frames sharded/frames -o report --max-rmse 0");
