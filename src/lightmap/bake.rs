@@ -5,25 +5,24 @@
 //! by any number of threads or machines, kept, and put together later. A first pass traces a few paths a texel in full; paths
 //! of the second read diffuse light from its map, one bounce away, where the mean over many texels hides their noise.
 
-use super::adjacency::adjacency;
 use super::denoise::DenoiseParams;
 use super::parts::Store;
-use super::solid::{Orientation, mark_solids};
+use super::solid::{Orientation, solids};
 use super::texels::Texels;
 use super::visible::{Visibility, facing};
 use super::{Atlas, AtlasParams, LightMap, fill, lookup, seam};
 use crate::base::math::{Rgb, hash_words};
-use crate::base::named::Parameters;
+use crate::base::named::{Parameters, within};
 use crate::base::progress::Progress;
 use crate::io::jobs::{Done, Shard, complete};
 use crate::material::Surface;
 use crate::material::bsdf::Lobes;
-use crate::scene::{Emitter, Scene};
+use crate::scene::Scene;
 use crate::transport::World;
 use crate::transport::follow::{Follow, OnCpu, Purpose};
 use crate::transport::path::{KnownDiffuse, PathParams};
 use crate::{Error, Result};
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -65,17 +64,26 @@ pub struct LightMapParams {
     /// reads has no bias of a filter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub denoise: Option<DenoiseParams>,
+    /// Metres within which what a ray meets blocks it: the map is ambient occlusion, and no light. `None`: it is light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ao: Option<f32>,
 }
 
 impl Default for LightMapParams {
     fn default() -> Self {
-        Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default(), first_spp: 0, denoise: None }
+        Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default(), first_spp: 0, denoise: None, ao: None }
     }
 }
 
 impl LightMapParams {
     /// Refuses what cannot be baked.
     pub fn validate(&self) -> Result<()> {
+        if let Some(distance) = self.ao {
+            within("--ao", distance, 1e-6..=1e9)?;
+            if self.first_spp > 0 {
+                return Err(Error::Request("--first-spp: --ao has no use for it: its rays have one segment".into()));
+            }
+        }
         match (self.spp, &self.denoise) {
             (0, _) => Err(Error::Request("--spp 0: expected at least 1".into())),
             (1, Some(_)) => Err(Error::Request("--denoise: one sample tells nothing of its noise; give --spp 2 or more".into())),
@@ -84,7 +92,7 @@ impl LightMapParams {
     }
 }
 
-/// E_T in an atlas's layout.
+/// E_T, or how open each texel is, in an atlas's layout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baked {
     /// On the side of the shading normal, rows from the top.
@@ -167,6 +175,11 @@ impl<'a> Plan<'a> {
         Pass { spp: self.params.spp, seed: self.seed, known, device: None, denoise: self.params.denoise }
     }
 
+    /// Whether it bakes light, and not ambient occlusion.
+    pub fn is_light(&self) -> bool {
+        self.params.ao.is_none()
+    }
+
     /// Texel sides to bake.
     pub fn len(&self) -> usize {
         self.items.len()
@@ -209,7 +222,8 @@ impl<'a> Plan<'a> {
         progress.start("Light map", todo.iter().map(|&b| self.block(b as u32).len() as u64).sum());
         let known = pass.known.map(|map| |s: &Surface, wo| map.diffuse_radiance(&self.world.scene, s, wo));
         let known = known.as_ref().map(|known| known as KnownDiffuse);
-        let on_cpu = OnCpu { world: self.world, purpose: Purpose::Irradiance, known, params: self.params.path };
+        let purpose = self.params.ao.map_or(Purpose::Irradiance, Purpose::Openness);
+        let on_cpu = OnCpu { world: self.world, purpose, known, params: self.params.path };
         let device = pass.device.unwrap_or(&on_cpu);
         // A GPU is fed with many texels at once.
         for group in todo.chunks(if pass.device.is_some() { GPU_BLOCKS } else { 1 }) {
@@ -363,35 +377,4 @@ pub fn atlas_of(scene: &Scene, params: &AtlasParams) -> Result<Atlas> {
     let bsdf = |object: usize| &scene.materials[scene.geometry.objects[object].material as usize].bsdf;
     let diffuse = |o: usize| bsdf(o).lobes().contains(Lobes::DIFFUSE) && !bsdf(o).is_transmissive();
     Atlas::build(&scene.geometry, &diffuse, params)
-}
-
-/// The solids of a scene. Masked objects have holes and transmissive ones let light in: they are none.
-fn solids(scene: &Scene) -> Orientation {
-    let geometry = &scene.geometry;
-    let mut occupied: Vec<Vec3> = scene.sensor.iter().map(|s| s.position()).collect();
-    for emitter in &scene.emitters {
-        match emitter {
-            Emitter::Area { object, .. } => {
-                let Some(o) = geometry.objects.get(*object as usize) else { continue };
-                // Points just before the emitting side, so that a lamp's own surface does not hold them.
-                for t in o.triangles.clone().step_by(o.triangles.len().div_ceil(16).max(1)) {
-                    let [a, b, c] = geometry.corners(t);
-                    let n = geometry.area_normal(t);
-                    occupied.push((a + b + c) / 3.0 + n.normalize_or_zero() * (1e-3 * n.length().sqrt()));
-                }
-            }
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } | Emitter::Projector { position, .. } => {
-                occupied.push(*position)
-            }
-            Emitter::Envmap { .. } | Emitter::Constant { .. } | Emitter::Sun { .. } | Emitter::Directional { .. } => {}
-        }
-    }
-    let mut orientation = vec![0; geometry.triangles.len()];
-    for (i, o) in geometry.objects.iter().enumerate() {
-        let material = &scene.materials[o.material as usize];
-        if material.opacity.is_none() && !material.bsdf.is_transmissive() {
-            mark_solids(geometry, &adjacency(geometry, i), &occupied, &mut orientation);
-        }
-    }
-    orientation
 }

@@ -9,7 +9,7 @@ use crate::base::progress::Progress;
 use crate::material::Surface;
 use crate::transport::Sampler;
 use crate::transport::follow::{Follow, PathStart, PathSum};
-use crate::transport::path::{KnownDiffuse, transmitted_irradiance};
+use crate::transport::path::{KnownDiffuse, openness, transmitted_irradiance};
 use rayon::prelude::*;
 
 /// Most sample points tried for each one that counts, in a texel that is hidden in part.
@@ -111,6 +111,9 @@ impl Plan<'_> {
     }
 
     pub(super) fn light(&self, pass: &Pass, surface: &Surface, back: bool, mut sampler: Sampler) -> Rgb {
+        if let Some(distance) = self.params.ao {
+            return openness(self.world, surface, back, distance, &mut sampler);
+        }
         let known = pass.known.map(|map| |s: &Surface, wo| map.diffuse_radiance(&self.world.scene, s, wo));
         let known = known.as_ref().map(|known| known as KnownDiffuse);
         // The path starts with a set of dimensions of its own, whether the view was tested or not.

@@ -6,6 +6,8 @@
 //! triangle's chart (2³²-1: none), and eight floats (as bits) a chart, the affine map from a world position
 //! to texels: column = (x, y, z, w) · (p, 1), then the row's four.
 //!
+//! A map of ambient occlusion has the channels `ao` and `ao_back` in their place, 1 in the open and 0 where all is blocked.
+//!
 //! *Ours*: the charts are planar projections, so a chart's eight floats say what else would be six a triangle.
 
 use super::Atlas;
@@ -21,6 +23,10 @@ use std::path::Path;
 
 /// First word of the table; changes with its layout.
 pub const MAGIC: u32 = 0x4c4d_0001;
+/// Layers of light, front and back.
+const IRRADIANCE: [&str; 2] = ["irradiance", "back"];
+/// Channels of ambient occlusion, front and back.
+const OPENNESS: [&str; 2] = ["ao", "ao_back"];
 /// Farthest that a corner may lie beyond the image, texels.
 const SLACK: f32 = 0.25;
 
@@ -41,14 +47,36 @@ impl LightMap {
     /// Reads the file that `bake-lightmap` wrote for this very scene.
     pub fn load(path: &Path, scene: &Scene) -> Result<Self> {
         let image = ExrImage::read(path)?;
-        image.provenance(path)?.check_scene(path, &scene.hash)?;
-        let front = image.rgb(path, "irradiance")?;
+        if image.has(OPENNESS[0]) {
+            return Err(Error::input(path, "holds ambient occlusion, written with --ao: expected light"));
+        }
+        let front = image.rgb(path, IRRADIANCE[0])?;
         let has_back = image.channels.iter().any(|(n, _)| n.starts_with("back."));
-        let back = if has_back { Some(image.rgb(path, "back")?) } else { None };
+        let back = if has_back { Some(image.rgb(path, IRRADIANCE[1])?) } else { None };
+        Self::placed(path, &image, scene, front, back)
+    }
+
+    /// Reads the ambient occlusion that `bake-lightmap --ao` wrote for this very scene: 1 in the open, 0 where all is blocked.
+    pub fn load_openness(path: &Path, scene: &Scene) -> Result<Self> {
+        let image = ExrImage::read(path)?;
+        let side = |name: &str| -> Result<Vec<Rgb>> { Ok(image.f32(path, name)?.into_iter().map(Rgb::splat).collect()) };
+        let front = side(OPENNESS[0])?;
+        let back = image.has(OPENNESS[1]).then(|| side(OPENNESS[1])).transpose()?;
+        Self::placed(path, &image, scene, front, back)
+    }
+
+    fn placed(path: &Path, image: &ExrImage, scene: &Scene, front: Vec<Rgb>, back: Option<Vec<Rgb>>) -> Result<Self> {
+        image.provenance(path)?.check_scene(path, &scene.hash)?;
         let size = [image.width as u32, image.height as u32];
         let corners = decode(&image.u32(path, "atlas")?, &scene.geometry, size)
             .map_err(|m| Error::input(path, format!("channel \"atlas\": {m}")))?;
         Ok(Self { size, front, back, corners })
+    }
+
+    /// Whether another map has its texels at the same places.
+    pub fn is_laid_out_as(&self, other: &Self) -> bool {
+        let bits = |map: &Self| map.corners.iter().flatten().flat_map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
+        self.size == other.size && bits(self) == bits(other)
     }
 
     /// E_T at a point of a triangle (barycentric weights of its second and third vertex), bilinear inside the chart.
@@ -105,8 +133,36 @@ pub fn sides(geometry: &Geometry, atlas: &Atlas, front: Vec<Rgb>, back: Option<V
     LightMap { size: atlas.size, front, back, corners: atlas.all_corners(geometry) }
 }
 
-/// The file's image. Rows are added below the picture where the table needs more room.
+/// The file's image of light.
 pub fn encode(geometry: &Geometry, atlas: &Atlas, front: &[Rgb], back: Option<&[Rgb]>, provenance: Provenance) -> ExrImage {
+    let layer = |(name, pixels): (&str, Option<&[Rgb]>)| {
+        let pixels = pixels.map(<[Rgb]>::to_vec).unwrap_or_default();
+        let channels = if pixels.is_empty() { 0..0 } else { 0..3 };
+        channels.map(|i| (format!("{name}.{}", ["R", "G", "B"][i]), channel(&pixels, i))).collect::<Vec<_>>()
+    };
+    let channels = IRRADIANCE.into_iter().zip([Some(front), back]).flat_map(layer).collect();
+    laid_out(geometry, atlas, channels).with_provenance(provenance)
+}
+
+/// The file's image of ambient occlusion, whose three channels are alike.
+pub fn encode_openness(
+    geometry: &Geometry,
+    atlas: &Atlas,
+    front: &[Rgb],
+    back: Option<&[Rgb]>,
+    provenance: Provenance,
+) -> ExrImage {
+    let sides = OPENNESS.into_iter().zip([Some(front), back]);
+    let channels = sides.filter_map(|(name, pixels)| Some((name.to_owned(), channel(pixels?, 0)))).collect();
+    laid_out(geometry, atlas, channels).with_provenance(provenance)
+}
+
+fn channel(pixels: &[Rgb], i: usize) -> Vec<f32> {
+    pixels.iter().map(|p| p[i]).collect()
+}
+
+/// Channels with the table of their places. Rows are added below the picture where the table needs more room.
+fn laid_out(geometry: &Geometry, atlas: &Atlas, channels: Vec<(String, Vec<f32>)>) -> ExrImage {
     let mut table = vec![MAGIC, geometry.triangles.len() as u32, atlas.charts.len() as u32];
     table.extend(&atlas.triangle_chart);
     for chart in &atlas.charts {
@@ -116,15 +172,9 @@ pub fn encode(geometry: &Geometry, atlas: &Atlas, front: &[Rgb], back: Option<&[
     let width = atlas.size[0] as usize;
     let height = (atlas.size[1] as usize).max(table.len().div_ceil(width));
     table.resize(width * height, 0);
-    let mut image = ExrImage::new(width, height);
-    for (layer, pixels) in [("irradiance", Some(front)), ("back", back)] {
-        let Some(pixels) = pixels else { continue };
-        for (i, c) in ["R", "G", "B"].into_iter().enumerate() {
-            let values = pixels.iter().map(|p| p[i]).chain(std::iter::repeat(0.0)).take(width * height);
-            image = image.with_f16(&format!("{layer}.{c}"), values);
-        }
-    }
-    image.with_u32("atlas", table).with_provenance(provenance)
+    let filled = |values: Vec<f32>| values.into_iter().chain(std::iter::repeat(0.0)).take(width * height);
+    let image = ExrImage::new(width, height);
+    channels.into_iter().fold(image, |image, (name, values)| image.with_f16(&name, filled(values))).with_u32("atlas", table)
 }
 
 fn decode(words: &[u32], geometry: &Geometry, size: [u32; 2]) -> std::result::Result<Vec<[Vec2; 3]>, String> {

@@ -4,8 +4,8 @@
 //! orientation, and which holds neither the sensor nor an emitter (or else the room itself would be a solid).
 //! A ray that meets the inner side of a solid first, started inside it.
 
-use super::adjacency::{Adjacency, NONE};
-use crate::scene::Geometry;
+use super::adjacency::{Adjacency, NONE, adjacency};
+use crate::scene::{Emitter, Geometry, Scene};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -81,6 +81,37 @@ fn winding(geometry: &Geometry, triangles: &[u32], p: Vec3) -> f64 {
             2.0 * a.dot(b.cross(c)).atan2(denominator)
         })
         .sum()
+}
+
+/// The solids of a scene. Masked objects have holes and transmissive ones let light in: they are none.
+pub(super) fn solids(scene: &Scene) -> Orientation {
+    let geometry = &scene.geometry;
+    let mut occupied: Vec<Vec3> = scene.sensor.iter().map(|s| s.position()).collect();
+    for emitter in &scene.emitters {
+        match emitter {
+            Emitter::Area { object, .. } => {
+                let Some(o) = geometry.objects.get(*object as usize) else { continue };
+                // Points just before the emitting side, so that a lamp's own surface does not hold them.
+                for t in o.triangles.clone().step_by(o.triangles.len().div_ceil(16).max(1)) {
+                    let [a, b, c] = geometry.corners(t);
+                    let n = geometry.area_normal(t);
+                    occupied.push((a + b + c) / 3.0 + n.normalize_or_zero() * (1e-3 * n.length().sqrt()));
+                }
+            }
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } | Emitter::Projector { position, .. } => {
+                occupied.push(*position)
+            }
+            Emitter::Envmap { .. } | Emitter::Constant { .. } | Emitter::Sun { .. } | Emitter::Directional { .. } => {}
+        }
+    }
+    let mut orientation = vec![0; geometry.triangles.len()];
+    for (i, o) in geometry.objects.iter().enumerate() {
+        let material = &scene.materials[o.material as usize];
+        if material.opacity.is_none() && !material.bsdf.is_transmissive() {
+            mark_solids(geometry, &adjacency(geometry, i), &occupied, &mut orientation);
+        }
+    }
+    orientation
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Paths that begin at given points: the one way in which a bake has them followed, on the CPU or on a GPU.
 
-use super::path::{KnownDiffuse, PathParams, scattered, transmitted_irradiance};
+use super::path::{KnownDiffuse, PathParams, openness, scattered, transmitted_irradiance};
 use super::{Sampler, World};
 use crate::Result;
 use crate::base::math::{Rgb, luminance};
@@ -91,6 +91,8 @@ pub enum Purpose<'a> {
     Scattering(Query, Option<&'a Elsewhere<'a>>),
     /// Light for a light map.
     Irradiance,
+    /// How open a light map's texel is: whether nothing blocks a ray within so many metres.
+    Openness(f32),
 }
 
 /// Surface, and direction towards the viewer, of a sample at an offset in [0, 1)² of the texel whose start has this index; `None` for the
@@ -118,6 +120,7 @@ impl OnCpu<'_> {
             Purpose::Irradiance => {
                 transmitted_irradiance(self.world, surface, start.wo[0] < 0.0, self.known, &self.params, &mut sampler)
             }
+            Purpose::Openness(distance) => openness(self.world, surface, start.wo[0] < 0.0, distance, &mut sampler),
             Purpose::Scattering(query, elsewhere) => {
                 let (surface, wo) = elsewhere.and_then(|elsewhere| elsewhere(i, offset)).unwrap_or((*surface, start.wo.into()));
                 scattered(self.world, &surface, wo, query, self.known, &self.params, &mut sampler)

@@ -11,6 +11,7 @@ use super::{Sampler, World};
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::material::Surface;
+use crate::material::bsdf::warp::cosine_hemisphere;
 use crate::material::bsdf::{Bsdf, BsdfSample, Lobes, Query};
 use crate::scene::Scene;
 use glam::{Vec2, Vec3};
@@ -132,6 +133,15 @@ pub fn transmitted_irradiance(
 ) -> Rgb {
     let measure = Measure::Irradiance { side: if back { -1.0 } else { 1.0 } };
     integrate(&Vertex { world, surface, measure }, known, params, sampler)
+}
+
+/// Ambient occlusion: one sample of ∫ V(ω) cos θ / π dω over the hemisphere of `frame.n`, or of its back, where V is 1 if nothing is met
+/// within `distance`.
+pub fn openness(world: &World, surface: &Surface, back: bool, distance: f32, sampler: &mut Sampler) -> Rgb {
+    let local = cosine_hemisphere(sampler.next_2d());
+    let direction = surface.frame.to_world(if back { -local } else { local });
+    let ray = Ray { t_max: distance, ..surface.spawn(direction) };
+    if world.occluded(&ray) { Rgb::ZERO } else { Rgb::ONE }
 }
 
 /// Radiance that a camera sees along `ray`, emission included (unless the scene hides its emitters), without a split.

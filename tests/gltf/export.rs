@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 use reprobe::exchange::{LoadOptions, load};
-use reprobe::export::gltf::glb;
+use reprobe::export::gltf::{Bakes, glb};
 use reprobe::lightmap::{Atlas, AtlasParams, LightMap, lookup};
 use reprobe::material::Texture;
 use reprobe::material::bsdf::Bsdf;
@@ -30,7 +30,7 @@ fn accessor<T: bytemuck::Pod>(document: &Value, binary: &[u8], index: &Value) ->
 }
 
 fn written(scene: &Scene, map: Option<&LightMap>, folder: &Path) -> (Scene, Value, Vec<u8>) {
-    let bytes = glb(scene, map, &json!({})).unwrap().bytes;
+    let bytes = glb(scene, Bakes { light: map, openness: None }, &json!({})).unwrap().bytes;
     let path = folder.join("scene.glb");
     std::fs::write(&path, &bytes).unwrap();
     let again = load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));

@@ -2,18 +2,19 @@
 
 use reprobe::io::jobs::Shard;
 use reprobe::lightmap::{AtlasParams, LightMapParams};
-use reprobe::plan::stages::BakeLightmap;
+use reprobe::plan::stages::{AO_DISTANCE, BakeLightmap};
 use std::path::PathBuf;
 
 /// Bake the diffuse light map
 ///
 /// Each texel becomes the light that enters the diffuse layer there; albedo stays out of it, so that textures keep their full
-/// resolution. Finished blocks are kept in OUTPUT.parts until the map is whole: a killed bake goes on from them.
+/// resolution. Surfaces without a diffuse lobe have no texels. Finished blocks are kept in OUTPUT.parts until the map is whole: a killed bake goes on from them.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512 --shard 0/4
-  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 16 --denoise")]
+  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 16 --denoise
+  reprobe bake-lightmap room/scene.xml -o ao.exr --ao=0.5 --spp 64")]
 pub struct Args {
     /// Scene: Mitsuba XML or JSON, or glTF
     #[arg(value_name = "SCENE")]
@@ -36,6 +37,10 @@ pub struct Args {
     /// the map of a first pass keeps its own. With --shard, the one that completes the blocks does it
     #[arg(long)]
     denoise: bool,
+    #[arg(long, value_name = "METRES", require_equals = true, conflicts_with = "first_spp",
+        help = format!("Ambient occlusion in place of light, for export-gltf and other programs: each texel becomes the cosine-weighted share of \
+            directions in which nothing lies within METRES [default: {AO_DISTANCE}]"))]
+    ao: Option<Option<f32>>,
     /// Bake blocks I, I+N, I+2N, ... only; the shard that completes them writes the map
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -44,7 +49,7 @@ pub struct Args {
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> BakeLightmap {
-        let Self { scene, output, spp, texel, texels, first_spp, denoise, shard } = self;
-        BakeLightmap { scene, output, spp: Some(spp), texel, texels, first_spp: Some(first_spp), denoise, shard }
+        let Self { scene, output, spp, texel, texels, first_spp, denoise, ao, shard } = self;
+        BakeLightmap { scene, output, spp: Some(spp), texel, texels, first_spp: Some(first_spp), denoise, ao, shard }
     }
 }

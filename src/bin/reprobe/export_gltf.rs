@@ -6,10 +6,12 @@ use std::path::PathBuf;
 /// Write a scene with its light map as glTF, for engines and viewers
 ///
 /// One binary file: shapes, materials as metallic-roughness, lights, the camera. The light map lies on the second texture
-/// coordinates, as MX_lightmap (irradiance, RGBM), and relative to its brightest as occlusion, for viewers that know no light maps.
+/// coordinates, as MX_lightmap (irradiance, RGBM). Viewers that know no light maps see occlusion: ambient occlusion where it is
+/// given, else the light map relative to its brightest.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe export-gltf room/scene.xml --lightmap out/lightmap.exr -o room.glb
+  reprobe export-gltf room/scene.xml --lightmap out/lightmap.exr --ao out/ao.exr -o room.glb
   reprobe export-gltf room/scene.xml -o room.glb        geometry, materials and lights alone")]
 pub struct Args {
     /// Scene: Mitsuba XML or JSON, or glTF
@@ -17,6 +19,9 @@ pub struct Args {
     /// Its light map, from bake-lightmap; transmissive shapes are left out then, as in the map
     #[arg(long, value_name = "FILE.exr")]
     lightmap: Option<PathBuf>,
+    /// Its ambient occlusion, from bake-lightmap --ao, for the occlusion texture
+    #[arg(long, value_name = "FILE.exr")]
+    ao: Option<PathBuf>,
     /// The file to write
     #[arg(short, long, value_name = "FILE.glb")]
     output: PathBuf,
@@ -25,7 +30,7 @@ pub struct Args {
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> ExportGltf {
-        let Self { scene, lightmap, output } = self;
-        ExportGltf { scene, lightmap, output }
+        let Self { scene, lightmap, ao, output } = self;
+        ExportGltf { scene, lightmap, ao, output }
     }
 }

@@ -1,7 +1,7 @@
 //! glTF 2.0 as one binary file: a scene with its light map on the second texture coordinates.
 //!
-//! No ratified extension has light maps. `MX_lightmap` (of nodes, RGBM) is the one here, with the map's relative luminance as occlusion for viewers
-//! that do not know it.
+//! No ratified extension has light maps. `MX_lightmap` (of nodes, RGBM) is the one here, with ambient occlusion, or else the map's relative luminance, as
+//! occlusion for viewers that do not know it.
 
 mod looks;
 mod pixels;
@@ -36,11 +36,21 @@ pub struct Exported {
     pub behind: usize,
 }
 
-/// Writes a scene, and the light map that was baked for it.
-pub fn glb(scene: &Scene, lightmap: Option<&LightMap>, provenance: &Value) -> Result<Exported> {
+/// What was baked for a scene, on one layout of texels.
+#[derive(Clone, Copy, Default)]
+pub struct Bakes<'a> {
+    /// Light.
+    pub light: Option<&'a LightMap>,
+    /// Ambient occlusion, 1 in the open.
+    pub openness: Option<&'a LightMap>,
+}
+
+/// Writes a scene, and what was baked for it.
+pub fn glb(scene: &Scene, bakes: Bakes, provenance: &Value) -> Result<Exported> {
     let mut warnings = Vec::new();
     let mut writer = Writer::default();
-    let maps = lightmap.map(|map| Maps::write(&mut writer, map)).transpose()?;
+    let (lightmap, layout) = (bakes.light, bakes.light.or(bakes.openness));
+    let light = lightmap.map(|map| Light::write(&mut writer, map)).transpose()?;
     let (mut materials, mut roots, mut behind) = (BTreeMap::new(), Vec::new(), 0);
     for (object, of) in scene.geometry.objects.iter().enumerate() {
         let bsdf = &scene.materials[of.material as usize].bsdf;
@@ -64,17 +74,19 @@ pub fn glb(scene: &Scene, lightmap: Option<&LightMap>, provenance: &Value) -> Re
             if triangles.is_empty() {
                 continue;
             }
-            let shape = shapes::shape(&scene.geometry, object, &triangles, lightmap, is_back);
+            let shape = shapes::shape(&scene.geometry, object, &triangles, layout, is_back);
             let mut node = json!({ "mesh": shape.write(&mut writer, &of.name, material), "name": of.name });
-            if let Some(maps) = &maps {
-                node["extensions"] = json!({ "MX_lightmap": maps.of(is_back) });
+            if let Some(light) = &light {
+                node["extensions"] = json!({ "MX_lightmap": light.of(is_back) });
             }
             roots.push(writer.push("nodes", node));
         }
     }
-    if let Some(maps) = &maps {
+    if light.is_some() {
         writer.uses("MX_lightmap");
-        writer.occlude(maps.occlusion);
+    }
+    if let Some(occlusion) = occlusion(&mut writer, bakes)? {
+        writer.occlude(occlusion);
     }
     let lights = lights(&mut writer, &scene.emitters, &mut roots, &mut warnings);
     if let Some(camera) = &scene.sensor {
@@ -98,32 +110,47 @@ pub fn is_ours(start: &[u8]) -> bool {
 }
 
 /// The textures of a light map.
-struct Maps {
+struct Light {
     front: usize,
     back: Option<usize>,
-    occlusion: usize,
     intensity: f32,
 }
 
-impl Maps {
+/// Of a texture whose charts must not mix with what lies beyond its edges.
+fn sampler() -> Value {
+    json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 })
+}
+
+/// Writes the texture of occlusion, of what says most of it.
+fn occlusion(writer: &mut Writer, bakes: Bakes) -> Result<Option<usize>> {
+    let (map, white, name) = match bakes {
+        Bakes { openness: Some(map), .. } => (map, 1.0, "ambient occlusion"),
+        Bakes { light: Some(map), .. } => {
+            let mut bright: Vec<f32> = map.front.iter().map(|p| luminance(*p)).filter(|l| *l > 0.0).collect();
+            bright.sort_unstable_by(f32::total_cmp);
+            let white = bright.get((bright.len() as f32 * (1.0 - BRIGHT)) as usize).copied().unwrap_or(1.0);
+            (map, white, "relative irradiance")
+        }
+        _ => return Ok(None),
+    };
+    let size = map.size.map(|n| n as usize);
+    let shares: Vec<f32> = map.front.iter().take(size[0] * size[1]).map(|p| luminance(*p) / white).collect();
+    Ok(Some(writer.texture(&pixels::occlusion(&shares, size)?, name, sampler())))
+}
+
+impl Light {
     fn write(writer: &mut Writer, map: &LightMap) -> Result<Self> {
         let size = map.size.map(|n| n as usize);
         let all = || map.front.iter().chain(map.back.iter().flatten());
         let largest = all().map(|p| p.max_element()).fold(0.0, f32::max);
         let intensity = (largest / pixels::RGBM_RANGE).max(1.0);
-        let sampler = || json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 });
         let mut texture = |pixels: &[Rgb], name: &str| -> Result<usize> {
             let picture: Vec<Rgb> = pixels.iter().take(size[0] * size[1]).map(|p| *p / intensity).collect();
             Ok(writer.texture(&pixels::rgbm(&picture, size)?, name, sampler()))
         };
         let front = texture(&map.front, "irradiance")?;
         let back = map.back.as_ref().map(|back| texture(back, "irradiance of backs")).transpose()?;
-        let mut bright: Vec<f32> = map.front.iter().map(|p| luminance(*p)).filter(|l| *l > 0.0).collect();
-        bright.sort_unstable_by(f32::total_cmp);
-        let white = bright.get((bright.len() as f32 * (1.0 - BRIGHT)) as usize).copied().unwrap_or(1.0);
-        let shares: Vec<f32> = map.front.iter().take(size[0] * size[1]).map(|p| luminance(*p) / white).collect();
-        let occlusion = writer.texture(&pixels::occlusion(&shares, size)?, "relative irradiance", sampler());
-        Ok(Self { front, back, occlusion, intensity })
+        Ok(Self { front, back, intensity })
     }
 
     fn of(&self, turned: bool) -> Value {

@@ -16,6 +16,9 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Metres within which what a ray meets blocks it, where `--ao` does not say it.
+pub const AO_DISTANCE: f32 = 1.0;
+
 stage! {
     /// Bakes the diffuse light map.
     BakeLightmap "bake-lightmap"
@@ -32,6 +35,8 @@ stage! {
         "--texels" texels: Option<u32>,
         /// Edge of a texel, metres, in place of the above.
         "--texel" texel: Option<f32>,
+        /// Ambient occlusion in place of light: rays are blocked by what they meet within so many metres.
+        "--ao" ao: Option<Option<f32>>,
         /// Take the noise out of the finished texels.
         "--denoise" denoise: bool,
         /// Bake this shard's blocks only.
@@ -56,6 +61,7 @@ impl BakeLightmap {
             first_spp: self.first_spp.unwrap_or(base.first_spp),
             atlas,
             denoise: self.denoise.then(DenoiseParams::default),
+            ao: self.ao.map(|distance| distance.unwrap_or(AO_DISTANCE)),
             ..base
         };
         within("--spp", params.spp, 1..=1 << 24)?;
@@ -89,7 +95,8 @@ impl BakeLightmap {
         let plan = Plan::new(&world, &params, cx.seed)?;
         let planned = clock() - loaded;
 
-        let scene = cx.on_gpu(|gpu| GpuScene::new(gpu, &world))?;
+        // Rays of ambient occlusion are followed on the CPU.
+        let scene = if params.ao.is_none() { cx.on_gpu(|gpu| GpuScene::new(gpu, &world))? } else { None };
         let first = self.first_pass(cx, &plan, &params, &first_store, scene.as_ref())?;
         let scene = match (scene, &first) {
             (Some(scene), Some(map)) => Some(scene.with_lightmap(map)?),
@@ -127,10 +134,11 @@ impl BakeLightmap {
         let atlas = &plan.atlas;
         let ([width, height], Done { kept, missing, .. }, [loaded, planned, seconds]) = (atlas.size, done, times);
         let state = done.rest(" blocks");
+        let what = if params.ao.is_some() { ", ambient occlusion" } else { "" };
         let denoised = if self.denoise && missing == 0 { ", denoised" } else { "" };
         Outcome {
             summary: format!(
-                "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples{denoised}, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
+                "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples{what}{denoised}, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
                 self.output.display(),
                 atlas.charts.len(),
                 atlas.texel,
@@ -141,7 +149,7 @@ impl BakeLightmap {
             ),
             figures: json!({
                 "size": atlas.size, "charts": atlas.charts.len(), "texel": atlas.texel, "texels": plan.len(), "backs": plan.backs(),
-                "spp": params.spp, "denoise": self.denoise, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
+                "spp": params.spp, "ao": params.ao, "denoise": self.denoise, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
                 "device": device, "seconds_load": loaded, "seconds_plan": planned, "seconds": seconds,
             }),
             ..Outcome::default()
@@ -168,6 +176,6 @@ fn write(plan: &Plan, world: &World, assemble: &dyn Fn() -> Result<Baked>, prove
         Err(_) if ExrImage::read(output).is_ok_and(|i| i.provenance.as_ref() == Some(provenance)) => return Ok(()),
         Err(e) => return Err(e),
     };
-    let image = lookup::encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone());
-    image.write(output)
+    let encode = if plan.is_light() { lookup::encode } else { lookup::encode_openness };
+    encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone()).write(output)
 }

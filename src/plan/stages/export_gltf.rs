@@ -1,7 +1,7 @@
 //! `export-gltf`.
 
 use crate::base::clock::seconds;
-use crate::export::gltf;
+use crate::export::gltf::{self, Bakes};
 use crate::io::provenance::hash_file;
 use crate::io::{Provenance, atomic};
 use crate::lightmap::LightMap;
@@ -21,6 +21,8 @@ stage! {
     {
         /// Its light map.
         "--lightmap" lightmap: Option<PathBuf>,
+        /// Its ambient occlusion.
+        "--ao" ao: Option<PathBuf>,
         /// The file to write.
         "--output" output: PathBuf,
     }
@@ -40,26 +42,37 @@ impl ExportGltf {
         self.check()?;
         let clock = seconds();
         // What a light map was baked for has no transmissive shapes.
-        let world = self.lightmap.is_some().then(|| cx.opaque_world(&self.scene)).transpose()?;
+        let is_baked = self.lightmap.is_some() || self.ao.is_some();
+        let world = is_baked.then(|| cx.opaque_world(&self.scene)).transpose()?;
         let loaded = if world.is_none() { Some(cx.load_scene(&self.scene)?) } else { None };
         let Some(scene) = world.as_ref().map(|w| &w.scene).or(loaded.as_ref()) else {
             return Err(Error::input(&self.scene, "no scene was read"));
         };
         let map = self.lightmap.as_ref().map(|path| LightMap::load(path, scene)).transpose()?;
-        let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
-        if let Some(path) = &self.lightmap {
-            provenance = provenance.with_input("lightmap", hash_file(path)?);
+        let openness = self.ao.as_ref().map(|path| LightMap::load_openness(path, scene)).transpose()?;
+        if let (Some(light), Some(open), Some(path)) = (&map, &openness, &self.ao)
+            && !light.is_laid_out_as(open)
+        {
+            return Err(Error::input(
+                path,
+                "its texels lie elsewhere than the light map's: bake both with the same --texels or --texel",
+            ));
         }
-        let exported = gltf::glb(scene, map.as_ref(), &json!(provenance))?;
+        let mut provenance = Provenance::new(Self::COMMAND, &scene.hash, cx.seed, &json!({}));
+        for (name, path) in [("lightmap", &self.lightmap), ("ao", &self.ao)] {
+            if let Some(path) = path {
+                provenance = provenance.with_input(name, hash_file(path)?);
+            }
+        }
+        let exported = gltf::glb(scene, Bakes { light: map.as_ref(), openness: openness.as_ref() }, &json!(provenance))?;
         exported.warnings.iter().for_each(|warning| cx.listener.warn(&format!("{}: {warning}", self.scene.display())));
         atomic::write(&self.output, &exported.bytes)?;
         let (shapes, triangles) = (scene.geometry.objects.len(), scene.geometry.triangles.len());
         let gltf::Exported { bytes, materials, behind, .. } = exported;
         let (megabytes, seconds) = (bytes.len() as f64 / 1e6, clock());
-        let light = match &map {
-            Some(map) => format!(", a light map of {} x {} texels", map.size[0], map.size[1]),
-            None => String::new(),
-        };
+        let texels = |map: &LightMap, what: &str| format!(", {what} of {} x {} texels", map.size[0], map.size[1]);
+        let light = [map.map(|m| texels(&m, "a light map")), openness.map(|m| texels(&m, "ambient occlusion"))];
+        let light: String = light.into_iter().flatten().collect();
         let output = self.output.display();
         Ok(Outcome {
             summary: format!(

@@ -20,7 +20,7 @@ mod video;
 mod view;
 
 pub use bake_lightfield::BakeLightfield;
-pub use bake_lightmap::BakeLightmap;
+pub use bake_lightmap::{AO_DISTANCE, BakeLightmap};
 pub use bake_probes::BakeProbes;
 pub use bake_transport::BakeTransport;
 pub use compare::{Compare, frame_names, read_pair};
