@@ -1,7 +1,11 @@
 //! KTX 2.0 textures of half floats: what engines read light from.
 
 use crate::base::math::Rgb;
+use crate::io::Provenance;
+use crate::{Error, Result};
 use half::f16;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
 
 /// How every such file begins.
 pub const IDENTIFIER: [u8; 12] = *b"\xabKTX 20\xbb\r\n\x1a\n";
@@ -11,6 +15,10 @@ const HALF_RGBA: u32 = 97;
 const TEXEL: usize = 8;
 /// What the file says wrote it.
 const WRITER: &[u8] = concat!("KTXwriter\0reprobe ", env!("CARGO_PKG_VERSION"), "\0").as_bytes();
+/// The key of what says where a texture came from. Keys stand in order of their letters.
+const ORIGIN: &[u8] = b"reprobe.provenance\0";
+/// Most bytes of keys and values: files are not trusted.
+const KEYS_MOST: u32 = 1 << 24;
 
 /// A texture of colours in half floats, alpha 1.
 pub struct Texture {
@@ -23,11 +31,12 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// The file's bytes.
-    pub fn encode(&self) -> Vec<u8> {
+    /// The file's bytes, with where the texture came from.
+    pub fn encode(&self, provenance: &Provenance) -> Vec<u8> {
         let levels = self.levels.len();
         let format = format();
-        let written = entry(WRITER);
+        let text = serde_json::to_string(provenance).unwrap_or_default();
+        let written = [entry(WRITER), entry(&[ORIGIN, text.as_bytes(), b"\0"].concat())].concat();
         let index = 80 + 24 * levels;
         let (format_at, written_at) = (index, index + format.len());
         let mut bytes = IDENTIFIER.to_vec();
@@ -64,6 +73,40 @@ impl Texture {
 pub fn is_ours(start: &[u8]) -> bool {
     let name = &WRITER[..b"KTXwriter\0reprobe ".len()];
     start.starts_with(&IDENTIFIER) && start.windows(name.len()).any(|w| w == name)
+}
+
+/// Width, height and depth of a file's texture, and where it came from, if it says so; its texels stay unread.
+pub fn read_provenance(path: &Path) -> Result<([u32; 3], Option<Provenance>)> {
+    let fail = |e| Error::io(path, e);
+    let bad = |what: &str| Error::input(path, format!("not a readable KTX 2.0 file: {what}"));
+    let mut file = std::fs::File::open(path).map_err(fail)?;
+    let mut head = [0; 80];
+    file.read_exact(&mut head).map_err(|_| bad("it ends within its header"))?;
+    if !head.starts_with(&IDENTIFIER) {
+        return Err(bad("it begins otherwise"));
+    }
+    let (size, [at, length]) = ([20, 24, 28].map(|at| word(&head[at..])), [56, 60].map(|at| word(&head[at..])));
+    if length > KEYS_MOST {
+        return Err(bad(&format!("{length} bytes of keys and values are more than the {KEYS_MOST} allowed")));
+    }
+    let mut keys = Vec::new();
+    file.seek(SeekFrom::Start(u64::from(at))).map_err(fail)?;
+    file.take(u64::from(length)).read_to_end(&mut keys).map_err(fail)?;
+    let mut rest = keys.as_slice();
+    while rest.len() > 4 {
+        let length = word(rest) as usize;
+        let content = rest.get(4..4 + length).ok_or_else(|| bad("a value ends beyond the last one's end"))?;
+        if let Some(text) = content.strip_prefix(ORIGIN) {
+            let found = serde_json::from_slice(text.strip_suffix(b"\0").unwrap_or(text));
+            return Ok((size, Some(found.map_err(|e| bad(&format!("its value \"reprobe.provenance\": {e}")))?)));
+        }
+        rest = rest.get(4 + length.next_multiple_of(4)..).unwrap_or_default();
+    }
+    Ok((size, None))
+}
+
+fn word(bytes: &[u8]) -> u32 {
+    bytes.iter().take(4).rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
 }
 
 /// The data format descriptor: four linear, signed floats of 16 bits, Rec.709 primaries.

@@ -5,6 +5,7 @@ use super::probes::cube::{Mirror, diffuse, direction, reflections};
 use super::probes::volume::volume;
 use super::probes::{Around, Probe};
 use crate::base::math::{Basis, Rgb};
+use crate::io::Provenance;
 use crate::method::light_field_probes::probe::Light;
 use crate::probe::octahedral::middle;
 use glam::{Vec2, Vec3};
@@ -20,7 +21,8 @@ fn probe(radiance: impl Fn(Vec3) -> Rgb, irradiance: impl Fn(Vec3) -> Rgb) -> Pr
 fn another_reader_finds_what_was_written() {
     let texel = |i: usize| Rgb::new(i as f32, 0.5 * i as f32, 1e6);
     let cube = Texture { size: [4, 4, 0], faces: 6, levels: [16, 4, 1].map(|n| (0..6 * n).map(texel).collect()).to_vec() };
-    let bytes = cube.encode();
+    let provenance = Provenance::new("export-probes", "abc", 7, &4);
+    let bytes = cube.encode(&provenance);
     assert!(super::ktx2::is_ours(&bytes[..bytes.len().min(4096)]));
     let reader = ktx2::Reader::new(&bytes[..]).unwrap();
     let header = reader.header();
@@ -28,8 +30,20 @@ fn another_reader_finds_what_was_written() {
     assert_eq!(header.format, Some(ktx2::Format::R16G16B16A16_SFLOAT));
     assert_eq!(header.supercompression_scheme, None);
     assert_eq!(reader.dfd_blocks().len(), 1);
-    let (key, value) = reader.key_value_data().next().unwrap();
-    assert_eq!((key, &value[..8]), ("KTXwriter", &b"reprobe "[..]));
+    let entries: Vec<_> = reader.key_value_data().collect();
+    assert_eq!((entries[0].0, &entries[0].1[..8]), ("KTXwriter", &b"reprobe "[..]));
+    let text = serde_json::to_string(&provenance).unwrap() + "\0";
+    assert_eq!(entries[1..], [("reprobe.provenance", text.as_bytes())]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ktx2");
+    for end in 0..=bytes.len().min(1024) {
+        std::fs::write(&path, &bytes[..end]).unwrap();
+        if let Err(e) = super::ktx2::read_provenance(&path) {
+            assert!(e.to_string().contains("a.ktx2: not a readable KTX 2.0 file"), "{end}: {e}");
+        }
+    }
+    std::fs::write(&path, &bytes).unwrap();
+    assert_eq!(super::ktx2::read_provenance(&path).unwrap(), ([4, 4, 0], Some(provenance.clone())));
     let levels: Vec<_> = reader.levels().collect();
     assert_eq!(levels.len(), 3);
     for (level, texels) in levels.iter().zip([16, 4, 1]) {
@@ -41,7 +55,7 @@ fn another_reader_finds_what_was_written() {
         }
     }
     let flat = Texture { size: [2, 4, 6], faces: 1, levels: vec![vec![Rgb::ONE; 48]] };
-    let bytes = flat.encode();
+    let bytes = flat.encode(&provenance);
     let reader = ktx2::Reader::new(&bytes[..]).unwrap();
     assert_eq!((reader.header().pixel_depth, reader.header().face_count, reader.levels().count()), (6, 1, 1));
 }

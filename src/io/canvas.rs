@@ -1,6 +1,8 @@
 //! Diagrams: a canvas with lines, marks, words and legends.
 
-use super::picture::{heat, write_png};
+use super::Provenance;
+use super::picture::heat;
+use super::png::write_png;
 use crate::Result;
 use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::ascii::FONT_6X13;
@@ -47,9 +49,9 @@ impl Canvas {
         Self { size: large, pixels: (0..large[0] * large[1]).map(at).collect() }
     }
 
-    /// Writes a PNG file.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        write_png(path, &self.pixels.concat(), self.size)
+    /// Writes a PNG file that says where it came from.
+    pub fn write(&self, path: &Path, provenance: &Provenance) -> Result<()> {
+        write_png(path, &self.pixels.concat(), self.size, provenance)
     }
 
     /// Gives a pixel a colour.

@@ -7,6 +7,7 @@ pub mod jobs;
 pub mod json;
 pub mod layer;
 pub mod picture;
+pub mod png;
 pub mod primaries;
 pub mod provenance;
 mod seal;

@@ -1,60 +1,8 @@
 //! Pictures of EXR layers for people: colours as sRGB, vectors and scalars in false colours, indices in random ones.
 
+use super::ExrImage;
 use super::layer::{Kind, Layer, Values, layers};
-use super::{ExrImage, atomic};
 use crate::base::math::hash_words;
-use crate::{Error, Result};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
-use std::path::Path;
-
-/// Bytes of a PNG file before its first chunk that says something about the picture: signature and header.
-const PNG_HEAD: usize = 8 + 25;
-/// What a PNG file that a stage writes says of itself: a chunk's type, its keyword and its text.
-const OURS: &[u8] = b"tEXtSoftware\0reprobe";
-
-/// Three bytes a pixel as a PNG file.
-pub fn png(pixels: &[u8], size: [usize; 2]) -> Result<Vec<u8>> {
-    encoded(pixels, size, ExtendedColorType::Rgb8)
-}
-
-/// Pixels of any kind as a PNG file.
-pub(crate) fn encoded(pixels: &[u8], [width, height]: [usize; 2], kind: ExtendedColorType) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(pixels, width as u32, height as u32, kind)
-        .map_err(|e| Error::Request(format!("PNG of {width} x {height}: {e}")))?;
-    Ok(bytes)
-}
-
-/// Writes a PNG file in one step, and into it who did.
-pub fn write_png(path: &Path, pixels: &[u8], size: [usize; 2]) -> Result<()> {
-    let mut bytes = png(pixels, size)?;
-    let mut sum = flate2::Crc::new();
-    sum.update(OURS);
-    let length = (OURS.len() - 4) as u32;
-    let chunk = [&length.to_be_bytes()[..], OURS, &sum.sum().to_be_bytes()].concat();
-    bytes.splice(PNG_HEAD..PNG_HEAD, chunk);
-    atomic::write(path, &bytes)
-}
-
-/// Refuses to write a picture where a file is that is not one of [`write_png`]'s, or where its name says that it is none.
-pub fn check_png(path: &Path) -> Result<()> {
-    if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-        return Err(Error::input(path, "expected a name that ends in .png"));
-    }
-    match std::fs::read(path) {
-        Ok(bytes) if !is_ours(&bytes) => {
-            Err(Error::input(path, "was not written by reprobe: remove it, or give the picture another name"))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Whether a file that begins like this was written by [`write_png`].
-pub fn is_ours(start: &[u8]) -> bool {
-    start.get(PNG_HEAD + 4..).is_some_and(|rest| rest.starts_with(OURS))
-}
 
 /// A layer of an image as 8-bit RGB.
 pub struct Picture {
@@ -249,20 +197,6 @@ mod tests {
         let colours = of("image", look);
         assert_eq!(colours.rgb, [255, 255, 255, 255, 0, 255, 0, 0, 0]);
         assert!(colours.legend.contains("exposure +2; magenta") && colours.values.without == 1, "{}", colours.legend);
-    }
-
-    #[test]
-    fn our_pictures_are_told_from_others() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.png");
-        check_png(&path).unwrap();
-        write_png(&path, &[1, 2, 3, 4, 5, 6], [2, 1]).unwrap();
-        check_png(&path).unwrap();
-        let bytes = std::fs::read(&path).unwrap();
-        assert_eq!(image::load_from_memory(&bytes).unwrap().to_rgb8().as_raw(), &[1, 2, 3, 4, 5, 6]);
-        std::fs::write(&path, png(&[0; 3], [1, 1]).unwrap()).unwrap();
-        assert!(check_png(&path).unwrap_err().to_string().contains("not written by reprobe"));
-        assert!(check_png(&folder.path().join("scene.xml")).unwrap_err().to_string().contains(".png"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
-//! Videos, encoded by ffmpeg: frames go to it as raw pixels, one after the other.
+//! Videos, encoded by ffmpeg: frames go to it as raw pixels, one after the other. Where they came from stands in them twice: as the comment
+//! that players show, where the format has one, and at their end, where we find it again whatever ffmpeg made of it.
 
-use super::atomic;
+use super::{Provenance, atomic};
 use crate::{Error, Result};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
@@ -14,6 +15,12 @@ const VARIABLE: &str = "FFMPEG";
 const OURS: &[u8] = b"made by reprobe";
 /// The bytes of a file that [`OURS`] is looked for in.
 const TAIL: u64 = 64;
+/// What stands before a file's provenance, which [`OURS`] follows: no JSON has such bytes.
+const ORIGIN: &[u8] = b"\0provenance\0";
+/// The bytes of a file that [`ORIGIN`] is looked for in.
+const ORIGIN_TAIL: u64 = 1 << 20;
+/// Most bytes of a part of a GIF file's comment.
+const GIF_PART: usize = 255;
 
 /// Kinds of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,24 +64,63 @@ impl Format {
     }
 
     /// What is put at the end of a file so that we know it again, and how much of its end that replaces: a part that players pass over.
-    fn mark(self) -> (Vec<u8>, i64) {
-        let length = OURS.len() as u8;
+    fn mark(self, origin: &str) -> (Vec<u8>, i64) {
+        let origin = [ORIGIN, origin.as_bytes()].concat();
+        let length = (origin.len() + OURS.len()) as u64;
         match self {
-            Self::Mp4 => ([&[0, 0, 0, 8 + length], &b"free"[..], OURS].concat(), 0),
-            Self::Webm => ([&[0xec, 0x80 | length], OURS].concat(), 0),
-            Self::Gif => ([&[0x21, 0xfe, length], OURS, &[0, b';']].concat(), 1),
+            Self::Mp4 => ([&(8 + length as u32).to_be_bytes(), &b"free"[..], &origin, OURS].concat(), 0),
+            // Eight bytes of length, of which the first says so.
+            Self::Webm => ([&[0xec], &(length | 1 << 56).to_be_bytes()[..], &origin, OURS].concat(), 0),
+            Self::Gif => {
+                let part = |bytes: &[u8]| [&[bytes.len() as u8], bytes].concat();
+                let parts: Vec<u8> = origin.chunks(GIF_PART).chain([OURS]).flat_map(part).collect();
+                ([&[0x21, 0xfe], &parts[..], &[0, b';']].concat(), 1)
+            }
         }
+    }
+
+    /// The provenance in what a file ends with, as text.
+    fn origin(self, tail: &[u8]) -> Option<Vec<u8>> {
+        let at = tail.windows(ORIGIN.len()).rposition(|part| part == ORIGIN)?;
+        let content = match self {
+            Self::Gif => parts(tail.get(at.checked_sub(1)?..)?),
+            _ => tail[at..].to_vec(),
+        };
+        content.strip_prefix(ORIGIN)?.strip_suffix(OURS).map(<[u8]>::to_vec)
     }
 }
 
 /// Whether a file is a video that we made.
 pub fn is_ours(path: &Path) -> std::io::Result<bool> {
+    Ok(tail(path, TAIL)?.windows(OURS.len()).any(|part| part == OURS))
+}
+
+/// Where a video came from; `None` of one that does not say.
+pub fn read_provenance(path: &Path) -> Result<Option<Provenance>> {
+    let tail = tail(path, ORIGIN_TAIL).map_err(|e| Error::io(path, e))?;
+    let read = |text: Vec<u8>| serde_json::from_slice(&text).map_err(|e| Error::input(path, format!("its provenance: {e}")));
+    Format::of(path)?.origin(&tail).map(read).transpose()
+}
+
+/// At most so many bytes of a file's end.
+fn tail(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     let mut file = std::fs::File::open(path)?;
     let length = file.metadata()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))?;
+    file.seek(SeekFrom::Start(length.saturating_sub(most)))?;
     let mut tail = Vec::new();
-    file.take(TAIL).read_to_end(&mut tail)?;
-    Ok(tail.windows(OURS.len()).any(|part| part == OURS))
+    file.take(most).read_to_end(&mut tail)?;
+    Ok(tail)
+}
+
+/// The parts of a GIF file's comment, joined: each with its length before it, up to one without any.
+fn parts(mut bytes: &[u8]) -> Vec<u8> {
+    let mut joined = Vec::new();
+    while let Some((&length, rest)) = bytes.split_first().filter(|(length, _)| **length > 0) {
+        let (part, next) = rest.split_at(rest.len().min(usize::from(length)));
+        joined.extend(part);
+        bytes = next;
+    }
+    joined
 }
 
 /// The program that encodes.
@@ -102,8 +148,9 @@ impl Ffmpeg {
         }
     }
 
-    /// Begins a video at `path`.
-    pub fn start(&self, path: &Path, size: [usize; 2], fps: f64) -> Result<Video> {
+    /// Begins a video at `path`, and tells it where it comes from.
+    pub fn start(&self, path: &Path, size: [usize; 2], fps: f64, provenance: &Provenance) -> Result<Video> {
+        let origin = serde_json::to_string(provenance).map_err(|e| Error::input(path, e.to_string()))?;
         let format = Format::of(path)?;
         let file = atomic::begin(path)?;
         if cfg!(windows) {
@@ -119,13 +166,15 @@ impl Ffmpeg {
             .args(["-hide_banner", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"])
             .args(["-s", &format!("{}x{}", padded[0], padded[1]), "-r", &fps.to_string(), "-i", "-"])
             .args(format.arguments())
+            // Else a WebM file has a random number.
+            .args(["-fflags", "+bitexact", "-metadata", &format!("comment={origin}")])
             .arg(target)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(words)
             .spawn()
             .map_err(|e| Error::Request(format!("{}: {e}", self.0.display())))?;
-        Ok(Video { path: path.into(), format, size, padded, file: Some(file), child, said })
+        Ok(Video { path: path.into(), format, origin, size, padded, file: Some(file), child, said })
     }
 }
 
@@ -133,6 +182,8 @@ impl Ffmpeg {
 pub struct Video {
     path: std::path::PathBuf,
     format: Format,
+    /// Where it comes from, as text.
+    origin: String,
     size: [usize; 2],
     padded: [usize; 2],
     file: Option<NamedTempFile>,
@@ -162,7 +213,7 @@ impl Video {
         }
         let Some(mut file) = self.file.take() else { return Ok(()) };
         let fail = |e| Error::io(&self.path, e);
-        let (mark, replaced) = self.format.mark();
+        let (mark, replaced) = self.format.mark(&self.origin);
         let length = file.as_file().metadata().map_err(fail)?.len() as i64;
         file.seek(SeekFrom::End(-replaced.min(length))).and_then(|_| file.write_all(&mark)).map_err(fail)?;
         atomic::finish(file, &self.path)
@@ -214,6 +265,32 @@ mod tests {
         let wide = [0, 1, 2, 3, 4, 5, 6, 7, 8, 6, 7, 8];
         assert_eq!(padded(&rgb, [3, 1], [4, 2]), [wide, wide].concat());
         assert_eq!(padded(&rgb, [3, 1], [3, 1]), rgb);
+    }
+
+    #[test]
+    fn a_mark_says_where_a_video_came_from() {
+        let folder = tempfile::tempdir().unwrap();
+        // Of more than one part of a GIF file's comment, with what stands before the provenance in one of its texts.
+        let provenance = Provenance::new("video", "abc", 7, &vec!["\0provenance\0"; 40]);
+        let text = serde_json::to_string(&provenance).unwrap();
+        for (format, name) in Format::ALL {
+            let path = folder.path().join(format!("walk.{name}"));
+            let bytes = [&b"frames;"[..], &format.mark(&text).0].concat();
+            std::fs::write(&path, &bytes).unwrap();
+            assert!(is_ours(&path).unwrap(), "{name}");
+            assert_eq!(read_provenance(&path).unwrap(), Some(provenance.clone()), "{name}");
+            for end in 0..bytes.len() - 2 {
+                std::fs::write(&path, &bytes[..end]).unwrap();
+                assert_ne!(read_provenance(&path).ok().flatten(), Some(provenance.clone()), "{name} {end}");
+            }
+            std::fs::write(&path, b"frames;made by reprobe").unwrap();
+            assert_eq!(read_provenance(&path).unwrap(), None, "{name}");
+        }
+        // Lengths as the formats have them.
+        let [mp4, webm, gif] = [Format::Mp4, Format::Webm, Format::Gif].map(|format| format.mark("{}").0);
+        assert_eq!(mp4, b"\0\0\0\x25free\0provenance\0{}made by reprobe");
+        assert_eq!(webm, b"\xec\x01\0\0\0\0\0\0\x1d\0provenance\0{}made by reprobe");
+        assert_eq!(gif, b"\x21\xfe\x0e\0provenance\0{}\x0fmade by reprobe\0;");
     }
 
     #[test]

@@ -13,6 +13,8 @@ pub mod values;
 mod view;
 pub mod without_noise;
 
+pub use view::page_provenance;
+
 use crate::base::math::Rgb;
 use rayon::prelude::*;
 use serde::Serialize;

@@ -4,7 +4,7 @@ use super::without_noise::WithoutNoise;
 use super::{Comparison, Metrics, Raster, flip, view};
 use crate::Result;
 use crate::io::Provenance;
-pub(super) use crate::io::picture::png;
+pub(super) use crate::io::png::png;
 use serde::Serialize;
 
 /// `metrics.json`.
@@ -68,7 +68,7 @@ impl Report {
     pub fn html(&self, titles: [&str; 2]) -> Result<String> {
         let parameters = &self.provenance.parameters;
         let data = serde_json::json!({
-            "frames": self.frames, "mean": self.mean, "titles": titles, "parameters": parameters,
+            "frames": self.frames, "mean": self.mean, "titles": titles, "parameters": parameters, "provenance": self.provenance,
             "gain": DIFFERENCE_GAIN, "colours": colours(),
         });
         view::page(include_str!("report.html"), &data)
@@ -163,6 +163,10 @@ mod tests {
         let html = report(&["</script><script>alert(1)"]).html(["a", "b"]).unwrap();
         assert!(!html.contains("</script><script>alert") && html.contains("\\u003c/script>\\u003cscript>alert(1)"));
         view::tests::is_usable_by_all(&html);
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("index.html"), &html).unwrap();
+        let found = view::page_provenance(&folder.path().join("index.html")).unwrap();
+        assert_eq!(found, Some(report(&[]).provenance));
     }
 
     #[test]

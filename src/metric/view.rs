@@ -1,8 +1,14 @@
 //! What the pages of `compare` and `evaluate` share: `view.css` and `view.js` (pictures that zoom and move together, values below the
 //! pointer, keys, the choice in the address), and how data get into a page.
 
+use crate::io::{Provenance, read_text};
 use crate::{Error, Result};
 use serde::Serialize;
+use serde_json::{Deserializer, Value};
+use std::path::Path;
+
+/// What stands before the data, in the page of `compare` and in that of `evaluate`.
+const BEFORE: [&str; 2] = ["const data = {", "id=\"data\">{"];
 
 /// The page of `template`, without outside resources, with `data` in it.
 pub fn page(template: &str, data: &impl Serialize) -> Result<String> {
@@ -11,6 +17,19 @@ pub fn page(template: &str, data: &impl Serialize) -> Result<String> {
     let data = data.replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029");
     let template = template.replace("/* view.css */", include_str!("view.css")).replace("// view.js", include_str!("view.js"));
     Ok(template.replace("{\"data\": \"goes here\"}", &data))
+}
+
+/// Where a page came from; `None` of one that is not ours, or does not say.
+///
+/// # Errors
+/// The file cannot be read, or its data are damaged.
+pub fn page_provenance(path: &Path) -> Result<Option<Provenance>> {
+    let text = read_text(path)?;
+    let Some(at) = BEFORE.iter().filter_map(|b| text.find(b).map(|at| at + b.len() - 1)).min() else { return Ok(None) };
+    let fail = |e: serde_json::Error| Error::input(path, format!("the data of the page: {e}"));
+    let data: Value = Deserializer::from_str(&text[at..]).into_iter().next().transpose().map_err(fail)?.unwrap_or_default();
+    let found = [&data["provenance"], &data["evaluation"]["provenance"]].into_iter().find(|p| !p.is_null());
+    found.map(|p| serde_json::from_value(p.clone()).map_err(fail)).transpose()
 }
 
 #[cfg(test)]

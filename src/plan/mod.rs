@@ -5,6 +5,7 @@
 //! do so for many methods at once.
 
 pub mod budget;
+pub mod carried;
 pub mod context;
 pub mod evaluation;
 pub mod frames;

@@ -1,7 +1,7 @@
 //! Outputs that would destroy something: an input of the same command, or a file that no stage wrote.
 
 use crate::export::gltf;
-use crate::io::{ExrImage, HEAD, is_sealed, picture, video};
+use crate::io::{ExrImage, HEAD, is_sealed, png, video};
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::Read;
@@ -29,7 +29,7 @@ fn is_foreign(path: &Path) -> Result<bool> {
     File::open(path).map_err(fail)?.take(HEAD as u64).read_to_end(&mut start).map_err(fail)?;
     Ok(match start.as_slice() {
         // Nothing, or what a crash of the machine left of it.
-        start if start.iter().all(|&byte| byte == 0) || is_sealed(start) || picture::is_ours(start) => false,
+        start if start.iter().all(|&byte| byte == 0) || is_sealed(start) || png::is_ours(start) => false,
         [b'{', ..] => {
             let bytes = std::fs::read(path).map_err(fail)?;
             serde_json::from_slice::<serde_json::Value>(&bytes).is_ok_and(|value| value.get("provenance").is_none())

@@ -8,13 +8,16 @@ mod pixels;
 mod shapes;
 mod writer;
 
-use crate::Result;
 use crate::base::math::{Rgb, luminance};
+use crate::io::Provenance;
 use crate::lightmap::LightMap;
 use crate::scene::{Camera, Emitter, Scene};
+use crate::{Error, Result};
 use glam::{Affine3A, DMat3, DMat4, DQuat, Mat4, Quat, Vec3};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
 use writer::Writer;
 
 /// Share of the map's texels that are as bright as occlusion's white, or brighter.
@@ -107,6 +110,25 @@ pub fn glb(scene: &Scene, bakes: Bakes, provenance: &Value) -> Result<Exported> 
 /// Whether a file that begins like this was written by [`glb`].
 pub fn is_ours(start: &[u8]) -> bool {
     start.get(JSON_AT..).is_some_and(|json| json.starts_with(OURS))
+}
+
+/// Where a GLB file of ours came from, if that is what it is; its meshes stay unread.
+pub fn read_provenance(path: &Path) -> Result<Option<Provenance>> {
+    let fail = |e| Error::io(path, e);
+    let bad = |what: String| Error::input(path, format!("not a readable GLB file: {what}"));
+    let mut file = std::fs::File::open(path).map_err(fail)?;
+    let mut head = Vec::new();
+    file.by_ref().take((JSON_AT + OURS.len()) as u64).read_to_end(&mut head).map_err(fail)?;
+    if !(head.starts_with(b"glTF") && is_ours(&head)) {
+        return Ok(None);
+    }
+    // What the file's words promise may be more than there is.
+    let length = u64::from(u32::from_le_bytes([head[12], head[13], head[14], head[15]]));
+    let mut text = head.split_off(JSON_AT);
+    file.take(length.saturating_sub(text.len() as u64)).read_to_end(&mut text).map_err(fail)?;
+    let document: Value = serde_json::from_slice(&text).map_err(|e| bad(e.to_string()))?;
+    let found = &document["asset"]["extras"]["provenance"];
+    serde_json::from_value(found.clone()).map_err(|e| bad(format!("asset.extras.provenance: {e}")))
 }
 
 /// The textures of a light map.

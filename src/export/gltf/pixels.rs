@@ -2,7 +2,8 @@
 
 use crate::Result;
 use crate::base::math::Rgb;
-use crate::io::picture::{byte, encoded as png, srgb};
+use crate::io::picture::{byte, srgb};
+use crate::io::png::encoded as png;
 use crate::material::image::Image;
 use image::ExtendedColorType;
 

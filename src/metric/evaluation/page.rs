@@ -91,6 +91,9 @@ mod tests {
         assert!(page.contains(&STANDARD.encode(&frame)));
         assert!(!page.contains("</script>theirs") && page.contains("\\u003c/script>theirs"));
         view::tests::is_usable_by_all(&page);
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("index.html"), &page).unwrap();
+        assert_eq!(view::page_provenance(&folder.path().join("index.html")).unwrap(), Some(evaluation.provenance));
         let decoded = image::load_from_memory(&frame).unwrap().to_rgb8();
         assert!((decoded.width(), decoded.height()) == (8, 4) && decoded.pixels().all(|p| p.0.iter().all(|c| c.abs_diff(7) < 3)));
     }

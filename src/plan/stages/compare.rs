@@ -2,7 +2,7 @@
 
 use crate::base::named::within;
 use crate::io::provenance::hash_file;
-use crate::io::{ExrImage, Provenance, atomic, json};
+use crate::io::{ExrImage, Provenance, atomic, json, png};
 use crate::metric::report::{FrameMetrics, Picture, Report};
 use crate::metric::without_noise::without_noise;
 use crate::metric::{Metrics, Raster, compare, ssim, values};
@@ -85,7 +85,7 @@ impl Compare {
             .par_iter()
             .enumerate()
             .map(|(i, pair)| {
-                let frame = self.frame(i, pair);
+                let frame = self.frame(cx, i, pair);
                 progress.advance(1);
                 frame
             })
@@ -96,16 +96,21 @@ impl Compare {
             let all: String = frames.iter().map(|(_, hashes)| hashes[side].as_str()).collect();
             blake3::hash(all.as_bytes()).to_hex().to_string()
         };
-        let parameters = Parameters { layer: self.layer(), exposure: self.exposure() };
-        let provenance = Provenance::new(Self::COMMAND, "", cx.seed, &parameters);
-        let roles = ["image", "reference", "second-reference"].into_iter().take(frames[0].1.len()).enumerate();
-        let provenance = roles.fold(provenance, |p, (side, role)| p.with_input(role, hash(side)));
+        let provenance = self.provenance(cx, &(0..frames[0].1.len()).map(hash).collect::<Vec<_>>());
         let report = Report::new(frames.into_iter().map(|(frame, _)| frame).collect(), provenance);
         let [a, b] = [&self.image, &self.reference].map(|p| p.display().to_string());
         let page = self.output.join("index.html");
         atomic::write(&page, report.html([&a, &b])?.as_bytes())?;
         json::write(&self.output.join("metrics.json"), &report)?;
         Ok(self.outcome(&report, &page))
+    }
+
+    /// Where an output comes from, by the hashes of image, reference and second reference.
+    fn provenance(&self, cx: &Context, hashes: &[String]) -> Provenance {
+        let parameters = Parameters { layer: self.layer(), exposure: self.exposure() };
+        let provenance = Provenance::new(Self::COMMAND, "", cx.seed, &parameters);
+        let roles = ["image", "reference", "second-reference"].into_iter().zip(hashes);
+        roles.fold(provenance, |p, (role, hash)| p.with_input(role, hash.clone()))
     }
 
     fn outcome(&self, report: &Report, page: &Path) -> Outcome {
@@ -131,15 +136,10 @@ impl Compare {
     }
 
     /// Reads, measures and draws one frame.
-    fn frame(&self, index: usize, pair: &Pair) -> Result<Measured> {
+    fn frame(&self, cx: &Context, index: usize, pair: &Pair) -> Result<Measured> {
         let [fa, fb] = &pair.files;
         let [a, b] = read_pair(fa, fb, self.layer())?;
         let comparison = compare(&a, &b, self.exposure());
-        for picture in Picture::ALL {
-            atomic::write(&self.output.join(picture.path(index)), &picture.png(&comparison)?)?;
-        }
-        let values = values::script(index, [&a, &b], &comparison)?;
-        atomic::write(&self.output.join(values::path(index)), values.as_bytes())?;
         let mut files = vec![fa.clone(), fb.clone()];
         let mut frame = FrameMetrics { name: pair.name.clone(), metrics: comparison.metrics, without_noise: None };
         if let Some(second) = &self.second_reference {
@@ -152,7 +152,14 @@ impl Compare {
             frame.without_noise = Some(without_noise(&a, [&b, &c], self.exposure()));
             files.push(fc);
         }
-        let hashes = files.iter().map(|f| hash_file(f)).collect::<Result<_>>()?;
+        let hashes = files.iter().map(|f| hash_file(f)).collect::<Result<Vec<_>>>()?;
+        let provenance = self.provenance(cx, &hashes);
+        for picture in Picture::ALL {
+            let path = self.output.join(picture.path(index));
+            atomic::write(&path, &png::signed(&path, picture.png(&comparison)?, &provenance)?)?;
+        }
+        let values = values::script(index, [&a, &b], &comparison)?;
+        atomic::write(&self.output.join(values::path(index)), values.as_bytes())?;
         Ok((frame, hashes))
     }
 }

@@ -70,14 +70,17 @@ impl ExportProbes {
         let set = LightFieldSet::read(&self.lightfield)?;
         std::fs::create_dir_all(&self.output).map_err(|e| Error::io(&self.output, e))?;
         let used = set.places.used();
+        let parameters = json!({ "size": size, "mirror": mirror });
+        let provenance = Provenance::new(Self::COMMAND, &set.provenance.scene, cx.seed, &parameters)
+            .with_input("probes", set_hash(&self.lightfield, LIGHTFIELD)?);
         cx.progress().start("probes for engines", used.len() as u64);
         let mut around: Vec<Option<Around>> = vec![None; set.places.len()];
         let (mut entries, mut bytes) = (Vec::new(), 0);
         for &i in &used {
             let probe = read(&set, &self.lightfield, i)?;
             let names = [format!("{i:04}.ktx2"), format!("{i:04}_diffuse.ktx2")];
-            bytes += self.write(&names[0], &cube::reflections(&probe, size, mirror))?;
-            bytes += self.write(&names[1], &cube::diffuse(&probe.around, mirror))?;
+            bytes += self.write(&names[0], &cube::reflections(&probe, size, mirror), &provenance)?;
+            bytes += self.write(&names[1], &cube::diffuse(&probe.around, mirror), &provenance)?;
             entries.push(json!({
                 "position": set.places.position(i).to_array(), "reflections": names[0], "diffuse": names[1],
                 "harmonics": probe.around.harmonics().map(|c| c.to_array())
@@ -89,12 +92,10 @@ impl ExportProbes {
         let mut table = json!({ "probes": entries, "mirror": mirror, "levels": size.ilog2() + 1 });
         if let Some(grid) = set.places.grid() {
             let texture = volume::volume(grid.counts, |i, normal| around[i].as_ref().map(|a| a.diffuse(normal)));
-            bytes += self.write(VOLUME, &texture)?;
+            bytes += self.write(VOLUME, &texture, &provenance)?;
             table["volume"] = extent(grid.origin, grid.spacing, grid.counts);
         }
-        let parameters = json!({ "size": size, "mirror": mirror });
-        let provenance = Provenance::new(Self::COMMAND, &set.provenance.scene, cx.seed, &parameters);
-        table["provenance"] = json!(provenance.with_input("probes", set_hash(&self.lightfield, LIGHTFIELD)?));
+        table["provenance"] = json!(provenance);
         json::write(&self.output.join(TABLE), &table)?;
         let (count, seconds, megabytes) = (used.len(), clock(), bytes as f64 / 1e6);
         let volume = if table["volume"].is_null() { "" } else { ", and a volume of diffuse light" };
@@ -107,19 +108,19 @@ impl ExportProbes {
     }
 
     /// Writes a texture, unless somebody else's file has its name; returns its bytes.
-    fn write(&self, name: &str, texture: &Texture) -> Result<usize> {
+    fn write(&self, name: &str, texture: &Texture, provenance: &Provenance) -> Result<usize> {
         let path = self.output.join(name);
         if std::fs::read(&path).is_ok_and(|found| !ktx2::is_ours(&found[..found.len().min(4096)])) {
             return Err(Error::input(&path, "was not written by reprobe: remove it, or give the output another name"));
         }
-        let bytes = texture.encode();
+        let bytes = texture.encode(provenance);
         atomic::write(&path, &bytes)?;
         Ok(bytes.len())
     }
 }
 
 /// The stage that the probes come from.
-const LIGHTFIELD: &str = "bake-lightfield";
+pub(super) const LIGHTFIELD: &str = "bake-lightfield";
 /// The file that says what there is.
 const TABLE: &str = "probes.json";
 const VOLUME: &str = "volume.ktx2";

@@ -2,7 +2,7 @@
 
 use crate::base::clock::Clock;
 use crate::base::named::within;
-use crate::io::picture;
+use crate::io::{Provenance, png};
 use crate::method::light_field_probes::LightFieldParams;
 use crate::method::light_field_probes::field::LightField;
 use crate::method::light_field_probes::hits::{Verdict, differ, found, judge, lobe_rays};
@@ -12,6 +12,7 @@ use crate::method::light_field_probes::march::Search;
 use crate::method::light_field_probes::shade::Shading;
 use crate::method::light_field_probes::store::LightFieldSet;
 use crate::plan::option::{List, Size, stage, text};
+use crate::plan::stages::export_probes::LIGHTFIELD;
 use crate::plan::views::views;
 use crate::plan::{Context, Outcome};
 use crate::probe::coverage::is_opaque;
@@ -20,12 +21,13 @@ use crate::probe::set::ProbeSet;
 use crate::probe::skeleton::field::Field;
 use crate::probe::skeleton::space::Space;
 use crate::probe::skeleton::voxels::Voxels;
+use crate::probe::store::set_hash;
 use crate::transport::World;
 use crate::view::View;
 use crate::view::baseline::Baseline;
 use crate::{Error, Result};
 use glam::Vec3;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 text!(Search);
@@ -69,7 +71,7 @@ const MARGIN: f32 = 0.02;
 impl InspectLightfield {
     /// Refuses what does not go together.
     pub fn check(&self) -> Result<()> {
-        picture::check_png(&self.output)?;
+        png::check_png(&self.output)?;
         if [self.probe.is_some(), self.pixel.is_some(), self.hits].into_iter().filter(|given| *given).count() != 1 {
             let message = "--probe, --pixel, --hits: expected one of them: a probe's maps, a ray's way, or what all rays meet";
             return Err(Error::Request(message.into()));
@@ -96,13 +98,13 @@ impl InspectLightfield {
         let world = cx.opaque_world(&self.scene)?;
         set.provenance.check_scene(&ProbeSet::path(&self.probes), &world.scene.hash)?;
         match (self.probe, self.pixel) {
-            (Some(probe), _) => self.draw_maps(&set, probe as usize),
+            (Some(probe), _) => self.draw_maps(cx, &set, probe as usize),
             (None, Some(pixel)) => self.draw_way(cx, &world, pixel.0),
-            (None, None) => self.draw_hits(&world),
+            (None, None) => self.draw_hits(cx, &world),
         }
     }
 
-    fn draw_maps(&self, set: &LightFieldSet, probe: usize) -> Result<Outcome> {
+    fn draw_maps(&self, cx: &Context, set: &LightFieldSet, probe: usize) -> Result<Outcome> {
         let places = &set.places;
         if probe >= places.len() {
             let last = places.len() - 1;
@@ -123,7 +125,8 @@ impl InspectLightfield {
         let title =
             format!("probe {probe} of {} at {p:.3}: +Y in the middle, -Y in the corners, +X right, +Z below", places.len());
         let (canvas, shown) = maps::draw(&title, &set.images(&self.probes, probe)?, self.exposure.unwrap_or(0.0));
-        canvas.write(&self.output)?;
+        let parameters = json!({ "probe": probe, "exposure": self.exposure.unwrap_or(0.0) });
+        canvas.write(&self.output, &self.provenance(cx, &set.provenance.scene, parameters)?)?;
         let mut summary = format!("{}: probe {probe} at {p:.3}\n", self.output.display());
         for map in &shown {
             summary += &format!("  {:10} {}\n", map.layer, map.legend);
@@ -137,6 +140,12 @@ impl InspectLightfield {
         })
     }
 
+    /// Where the picture comes from.
+    fn provenance(&self, cx: &Context, scene: &str, parameters: Value) -> Result<Provenance> {
+        let provenance = Provenance::new(Self::COMMAND, scene, cx.seed, &parameters);
+        Ok(provenance.with_input("probes", set_hash(&self.probes, LIGHTFIELD)?))
+    }
+
     /// All views, and the number of the one that is asked for.
     fn views(&self, world: &World) -> Result<(Vec<View>, usize)> {
         let views = views(&world.scene, self.path.as_deref(), self.size.map(|s| s.0), None)?;
@@ -147,7 +156,7 @@ impl InspectLightfield {
         Ok((views, number))
     }
 
-    fn draw_hits(&self, world: &World) -> Result<Outcome> {
+    fn draw_hits(&self, cx: &Context, world: &World) -> Result<Outcome> {
         let (views, number) = self.views(world)?;
         let field = LightField::load(&self.probes, &world.scene)?;
         let params = LightFieldParams::default();
@@ -167,7 +176,9 @@ impl InspectLightfield {
             rays.len(),
             field.places.used().len()
         );
-        hits::draw(&title, &view, &rays, &verdicts, &words).write(&self.output)?;
+        let parameters = of_frame(number, &views[number], search);
+        let provenance = self.provenance(cx, &world.scene.hash, parameters)?;
+        hits::draw(&title, &view, &rays, &verdicts, &words).write(&self.output, &provenance)?;
         let lines: String = words.iter().map(|line| format!("  {line}\n")).collect();
         Ok(Outcome {
             summary: format!(
@@ -203,7 +214,10 @@ impl InspectLightfield {
         let way = Way::new((world, &field), asked, search, params.thickness);
         let space = space(world, &views, &field)?;
         let title = format!("frame {number}, pixel {x},{y}: {}, {search}", way.kind());
-        draw((world, &space), &field, &way, &title).write(&self.output)?;
+        let mut parameters = of_frame(number, &views[number], search);
+        parameters["pixel"] = json!([x, y]);
+        let provenance = self.provenance(cx, &world.scene.hash, parameters)?;
+        draw((world, &space), &field, &way, &title).write(&self.output, &provenance)?;
         cx.listener.detail(&format!("{} probes were asked", way.steps.len()));
         let mut figures = way.figures();
         figures["frame"] = number.into();
@@ -211,6 +225,14 @@ impl InspectLightfield {
         figures["trace"] = search.to_string().into();
         Ok(Outcome { summary: format!("{}: {title}\n{}", self.output.display(), way.text()), figures, ..Outcome::default() })
     }
+}
+
+/// What a picture of a frame depends on besides scene and probes.
+fn of_frame(number: usize, view: &View, search: Search) -> Value {
+    let camera = &view.camera;
+    json!({
+        "frame": number, "to_world": camera.to_world.to_cols_array(), "fov_x_rad": camera.fov_x, "size": camera.size, "trace": search.to_string(),
+    })
 }
 
 /// A sentence a verdict, and the shares by name.

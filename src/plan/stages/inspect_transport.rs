@@ -1,14 +1,15 @@
 //! `inspect-transport`.
 
 use crate::base::named::within;
-use crate::io::json;
-use crate::io::picture;
+use crate::io::{Provenance, json, png};
 use crate::method::radiance_probes::inspect::draw;
 use crate::method::radiance_probes::round_trip::{load, norms};
 use crate::method::radiance_probes::transport::sample;
 use crate::plan::option::stage;
 use crate::plan::views::views;
 use crate::plan::{Context, Outcome};
+use crate::probe::store::set_hash;
+use crate::scene::Camera;
 use crate::{Error, Result};
 use serde_json::json;
 use std::path::PathBuf;
@@ -36,13 +37,15 @@ stage! {
     }
 }
 
+/// The stage that the operator comes from.
+const TRANSPORT: &str = "bake-transport";
 /// Receivers that are asked where nothing else is said.
 pub const RECEIVERS: u32 = 8000;
 
 impl InspectTransport {
     /// Refuses what is out of range.
     pub fn check(&self) -> Result<()> {
-        picture::check_png(&self.output)?;
+        png::check_png(&self.output)?;
         within("--receivers", self.receivers.unwrap_or(RECEIVERS), 1..=1 << 26)
     }
 
@@ -59,13 +62,14 @@ impl InspectTransport {
         let receivers = sample(transport.receivers.len(), self.receivers.unwrap_or(RECEIVERS));
         let found = norms(&world, &transport, &receivers);
         let list: Vec<(u32, f32)> = receivers.into_iter().zip(found).collect();
-        draw(&world, &transport, &list, &view.camera).write(&self.output)?;
+        let provenance = self.provenance(cx, &world.scene.hash, &view.camera)?;
+        draw(&world, &transport, &list, &view.camera).write(&self.output, &provenance)?;
         if let Some(table) = &self.table {
             let entry = |(r, norm): &(u32, f32)| {
                 let (receiver, p) = (&transport.receivers[*r as usize], transport.place(&world, *r));
                 json!({ "pixel": receiver.pixel, "back": receiver.back, "position": p.to_array(), "norm": norm })
             };
-            json::write(table, &json!({ "receivers": list.iter().map(entry).collect::<Vec<_>>() }))?;
+            json::write(table, &json!({ "receivers": list.iter().map(entry).collect::<Vec<_>>(), "provenance": provenance }))?;
         }
         let mut sorted: Vec<f32> = list.iter().map(|n| n.1).collect();
         sorted.sort_by(f32::total_cmp);
@@ -85,5 +89,15 @@ impl InspectTransport {
             }),
             ..Outcome::default()
         })
+    }
+
+    /// Where picture and table come from.
+    fn provenance(&self, cx: &Context, scene: &str, camera: &Camera) -> Result<Provenance> {
+        let parameters = json!({
+            "receivers": self.receivers.unwrap_or(RECEIVERS), "to_world": camera.to_world.to_cols_array(), "fov_x_rad": camera.fov_x,
+            "size": camera.size,
+        });
+        let provenance = Provenance::new(Self::COMMAND, scene, cx.seed, &parameters);
+        Ok(provenance.with_input("probes", set_hash(&self.probes, TRANSPORT)?))
     }
 }

@@ -137,7 +137,7 @@ impl PlaceProbes {
         let reachable = Reachable::new(world, &bounds, &ground.cameras, &NonuniformParams::default())?;
         let used: Vec<Vec3> = grid.used().into_iter().map(|i| grid.position(i)).collect();
         let times = reachable.sides.times_seen(&reachable.sides.rows(world, &used));
-        self.draw(cx, world, (ground, &reachable), (&used, &times))?;
+        self.draw(cx, world, (ground, &reachable), (&used, &times, &grid.provenance))?;
         let seen: f64 = reachable.sides.list.iter().zip(&times).filter(|(_, n)| **n > 0).map(|(s, _)| f64::from(s.area)).sum();
         Ok(Some(seen / reachable.sides.area))
     }
@@ -171,7 +171,7 @@ impl PlaceProbes {
         list.write(&self.output)?;
         let seconds = clock();
         let times = reachable.sides.times_seen(&placed.rows);
-        self.draw(cx, world, (ground, &reachable), (&placed.positions, &times))?;
+        self.draw(cx, world, (ground, &reachable), (&placed.positions, &times, &list.provenance))?;
         let (lower, upper) = ground.bounds.filled;
         let refined = match self.refine {
             Some(n) => format!("; after {n} passes of refinement {}", percent(placed.after.coverage)),
@@ -192,20 +192,24 @@ impl PlaceProbes {
         })
     }
 
-    /// Writes the pictures that are asked for; `times`: how many probes see each side.
+    /// Writes the pictures that are asked for; `times`: how many probes see each side. They come from what the probes come from.
     fn draw(
         &self,
         cx: &Context,
         world: &World,
         (ground, reachable): (&Ground, &Reachable),
-        (probes, times): (&[Vec3], &[u32]),
+        (probes, times, origin): (&[Vec3], &[u32], &Provenance),
     ) -> Result<()> {
         if let Some(path) = &self.picture {
-            plan_picture::draw(world, &reachable.space, probes).write(path)?;
+            plan_picture::draw(world, &reachable.space, probes).write(path, origin)?;
         }
         if let (Some(path), Some(camera)) = (&self.coverage_picture, &ground.first) {
             let coverage = Coverage { sides: &reachable.sides, times, probes, camera };
-            coverage_picture::draw(world, &coverage, cx.progress()).write(path)?;
+            let mut origin = origin.clone();
+            origin.parameters["view"] = json!({
+                "to_world": camera.to_world.to_cols_array(), "fov_x_rad": camera.fov_x, "size": camera.size,
+            });
+            coverage_picture::draw(world, &coverage, cx.progress()).write(path, &origin)?;
         }
         Ok(())
     }
@@ -249,7 +253,7 @@ impl PlaceProbes {
     }
 }
 
-/// A share as people read it; never 100 % of what is less.
+/// A share as people read it; never 100 % of what is less, and never -0 %, which the sum of nothing is.
 fn percent(share: f64) -> String {
-    format!("{:.2} %", if share < 1.0 { (share * 100.0).min(99.99) } else { 100.0 })
+    format!("{:.2} %", if share < 1.0 { (share * 100.0).clamp(0.0, 99.99) + 0.0 } else { 100.0 })
 }

@@ -2,10 +2,11 @@
 
 use super::view::{STOPS, check_range, layer, refuse_idle};
 use crate::base::named::within;
-use crate::io::ExrImage;
 use crate::io::layer::{Kind, layers, most_telling};
 use crate::io::picture::{self, Look, Picture};
+use crate::io::provenance::{hash_file, hash_of};
 use crate::io::video::{Ffmpeg, Format, Video as Encoder};
+use crate::io::{ExrImage, Provenance};
 use crate::plan::option::{List, stage};
 use crate::plan::timings::Timings;
 use crate::plan::{Context, Outcome};
@@ -51,6 +52,8 @@ struct Shot<'a> {
     kind: Kind,
     legend: String,
     look: Look,
+    /// Content hash of the scene, where the first frame says it.
+    scene: String,
     /// Width and height of each folder's frames.
     sizes: Vec<[usize; 2]>,
 }
@@ -73,7 +76,8 @@ impl Video {
         refuse_idle(self.exposure.is_some(), self.range.is_some(), std::iter::once(shot.kind))?;
         let of_path = || Timings::read(&self.frames.join("timings.json")).and_then(|t| t.fps);
         let fps = self.fps.or_else(of_path).unwrap_or(FPS);
-        self.encode(&shot, &frames, ffmpeg.start(&self.output, shot.size(), fps)?, cx)?;
+        let provenance = self.provenance(cx, &shot, &frames, fps)?;
+        self.encode(&shot, &frames, ffmpeg.start(&self.output, shot.size(), fps, &provenance)?, cx)?;
         let size = Format::of(&self.output)?.padded(shot.size());
         let (count, seconds) = (frames.len(), frames.len() as f64 / fps);
         let summary = format!(
@@ -115,6 +119,18 @@ impl Video {
         Ok(frames)
     }
 
+    /// Where the video comes from: what is shown of which frames.
+    fn provenance(&self, cx: &Context, shot: &Shot, frames: &[(u64, String)], fps: f64) -> Result<Provenance> {
+        let parameters = json!({
+            "layer": shot.layer, "legend": shot.legend, "fps": fps, "frames": frames.iter().map(|(number, _)| number).collect::<Vec<_>>(),
+        });
+        let provenance = Provenance::new(Self::COMMAND, &shot.scene, cx.seed, &parameters);
+        shot.folders.iter().zip(["frames", "beside"]).try_fold(provenance, |provenance, (folder, role)| {
+            let hashes = frames.par_iter().map(|(_, name)| hash_file(&folder.join(name))).collect::<Result<Vec<_>>>()?;
+            Ok(provenance.with_input(role, hash_of(hashes.concat().as_bytes())))
+        })
+    }
+
     /// What the first frame says of all.
     fn shot(&self, name: &str) -> Result<Shot<'_>> {
         let folders: Vec<&Path> = std::iter::once(&self.frames).chain(&self.beside).map(PathBuf::as_path).collect();
@@ -147,7 +163,8 @@ impl Video {
             }
             sizes.push([other.width, other.height]);
         }
-        Ok(Shot { folders, layer, kind, legend, look, sizes })
+        let scene = image.provenance.as_ref().map_or_else(String::new, |p| p.scene.clone());
+        Ok(Shot { folders, layer, kind, legend, look, scene, sizes })
     }
 
     /// Frames are read in parallel, some at once, and handed over in order while the next ones are read.

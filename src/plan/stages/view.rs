@@ -1,11 +1,12 @@
 //! `view`.
 
 use crate::base::named::within;
-use crate::io::ExrImage;
 use crate::io::canvas::{Canvas, Colour};
 use crate::io::layer::{IMAGE, Kind, Layer, layers, most_telling, named};
 use crate::io::picture::{self, Look, Picture};
+use crate::io::provenance::hash_of;
 use crate::io::sheet::{self, Cell, MOST_PIXELS};
+use crate::io::{ExrImage, Provenance, png};
 use crate::plan::option::{List, stage};
 use crate::plan::{Context, Outcome};
 use crate::{Error, Result};
@@ -43,10 +44,24 @@ struct Shown {
     picture: Picture,
 }
 
+/// What a file is, and what of.
+struct Origin {
+    /// Its content hash.
+    hash: String,
+    /// That of its scene, where it says so.
+    scene: Option<String>,
+}
+
+/// The scene that all files are of; empty where they are of several, or do not say.
+fn scene_of(origins: &[Origin]) -> &str {
+    let first = origins.first().and_then(|of| of.scene.as_deref()).unwrap_or_default();
+    if origins.iter().all(|of| of.scene.as_deref() == Some(first)) { first } else { "" }
+}
+
 impl View {
     /// Refuses what is out of range.
     pub fn check(&self) -> Result<()> {
-        picture::check_png(&self.output)?;
+        png::check_png(&self.output)?;
         within("--exposure", self.exposure.unwrap_or(0.0), STOPS)?;
         within("--scale", self.scale.unwrap_or(1), 1..=64)?;
         check_range(self.range)?;
@@ -57,12 +72,13 @@ impl View {
     }
 
     /// Reads, draws, writes.
-    pub fn run(&self, _: &Context) -> Result<Outcome> {
+    pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
-        let drawn: Vec<Vec<Shown>> = self.files.iter().map(|file| self.draw(file)).collect::<Result<_>>()?;
-        let shown: Vec<Shown> = drawn.into_iter().flatten().collect();
+        let drawn: Vec<(Vec<Shown>, Origin)> = self.files.iter().map(|file| self.draw(file)).collect::<Result<_>>()?;
+        let (shown, origins): (Vec<Vec<Shown>>, Vec<Origin>) = drawn.into_iter().unzip();
+        let shown: Vec<Shown> = shown.into_iter().flatten().collect();
         refuse_idle(self.exposure.is_some(), self.range.is_some(), shown.iter().map(|s| s.picture.kind))?;
-        let size = self.write(&shown)?;
+        let size = self.write(&shown, &self.provenance(cx, &shown, &origins))?;
         let mut summary = format!("{}: {} x {}\n", self.output.display(), size[0], size[1]);
         for Shown { file, picture } in &shown {
             summary += &format!("  {} {}: {}; {}\n", file.display(), picture.layer, picture.legend, values(picture));
@@ -71,9 +87,24 @@ impl View {
         Ok(Outcome { summary, figures, ..Outcome::default() })
     }
 
+    /// Where the picture comes from: what of which files is drawn, and how.
+    fn provenance(&self, cx: &Context, shown: &[Shown], origins: &[Origin]) -> Provenance {
+        let pictures = |of: fn(&Picture) -> &String| -> Vec<&String> { shown.iter().map(|s| of(&s.picture)).collect() };
+        let parameters = json!({
+            "layers": pictures(|p| &p.layer), "legends": pictures(|p| &p.legend), "scale": self.scale.unwrap_or(1),
+        });
+        let provenance = Provenance::new(Self::COMMAND, scene_of(origins), cx.seed, &parameters);
+        match origins {
+            [only] => provenance.with_input("file", only.hash.clone()),
+            all => all.iter().enumerate().fold(provenance, |p, (i, of)| p.with_input(&format!("files/{i:04}"), of.hash.clone())),
+        }
+    }
+
     /// The layers of a file that are asked for.
-    fn draw(&self, file: &Path) -> Result<Vec<Shown>> {
-        let image = ExrImage::read(file)?;
+    fn draw(&self, file: &Path) -> Result<(Vec<Shown>, Origin)> {
+        let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
+        let image = ExrImage::from_bytes(file, &bytes)?;
+        let origin = Origin { hash: hash_of(&bytes), scene: image.provenance.as_ref().map(|p| p.scene.clone()) };
         let all = layers(&image);
         let chosen: Vec<&Layer> = match self.layer.as_deref() {
             None => vec![most_telling(file, &all)?],
@@ -82,11 +113,12 @@ impl View {
         };
         let exposure = self.exposure.unwrap_or_else(|| picture::usual_exposure(&image));
         let look = Look { exposure, ranges: self.range.map(|r| [r.0; 3]) };
-        Ok(chosen.into_iter().map(|l| Shown { file: file.into(), picture: picture::draw(&image, l, &look) }).collect())
+        let shown = chosen.into_iter().map(|l| Shown { file: file.into(), picture: picture::draw(&image, l, &look) });
+        Ok((shown.collect(), origin))
     }
 
     /// Writes one picture as it is, and several on a sheet; the size of what was written.
-    fn write(&self, shown: &[Shown]) -> Result<[usize; 2]> {
+    fn write(&self, shown: &[Shown], provenance: &Provenance) -> Result<[usize; 2]> {
         let zoomed = shown.iter().map(|s| self.zoomed(&s.picture));
         let canvas = match shown {
             [Shown { picture, .. }] => self.zoomed(picture)?,
@@ -96,7 +128,7 @@ impl View {
                 sheet::draw(&shown.iter().zip(zoomed).map(cell).collect::<Result<Vec<_>>>()?)?
             }
         };
-        canvas.write(&self.output)?;
+        canvas.write(&self.output, provenance)?;
         Ok(canvas.size)
     }
 

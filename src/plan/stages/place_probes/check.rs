@@ -1,7 +1,7 @@
 //! Options of `place-probes` that do not go together.
 
 use super::PlaceProbes;
-use crate::io::picture;
+use crate::io::png;
 use crate::probe::nonuniform::COVERAGE;
 use crate::probe::placement::{PROBES_MAX, Placement};
 use crate::{Error, Result};
@@ -31,7 +31,7 @@ impl PlaceProbes {
             return Err(Error::Request("--bounds, --path: expected one of them".into()));
         }
         for path in [&self.picture, &self.coverage_picture].into_iter().flatten() {
-            picture::check_png(path)?;
+            png::check_png(path)?;
         }
         if self.picture.is_some() && self.picture == self.coverage_picture {
             return Err(Error::Request("--picture, --coverage-picture: expected two files".into()));

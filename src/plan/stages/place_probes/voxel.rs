@@ -50,7 +50,7 @@ impl PlaceProbes {
         list.write(&self.output)?;
         let seconds = clock();
         let times = reachable.sides.times_seen(&placed.rows);
-        self.draw(cx, world, (ground, &reachable), (&placed.positions, &times))?;
+        self.draw(cx, world, (ground, &reachable), (&placed.positions, &times, &list.provenance))?;
         Ok(self.report(ground, &params, &placed, seconds))
     }
 
