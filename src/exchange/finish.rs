@@ -32,6 +32,10 @@ fn checked(mut scene: Scene) -> Result<Scene> {
     if scene.geometry.triangles.is_empty() {
         return Err(Error::input(&scene.path, "the scene has no triangles"));
     }
+    if let Some(i) = scene.geometry.positions.iter().position(|p| !p.is_finite()) {
+        let (path, found) = (&scene.path, scene.geometry.positions[i]);
+        return Err(Error::input(path, format!("a vertex stands at {found} in the scene, expected finite numbers")));
+    }
     let area: f64 = (0..scene.geometry.triangles.len() as u32).map(|t| f64::from(scene.geometry.area_normal(t).length())).sum();
     if !(area > 0.0 && area.is_finite()) {
         return Err(Error::input(

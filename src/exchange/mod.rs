@@ -7,6 +7,7 @@ pub mod mesh;
 pub mod mitsuba;
 
 use crate::Result;
+use crate::io;
 use crate::scene::Scene;
 use std::path::Path;
 
@@ -28,9 +29,14 @@ pub struct LoadOptions {
 
 /// Loads a scene: Mitsuba XML, Mitsuba's dictionary form as JSON, or glTF, as the file's name says.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    decode(path, io::read(path)?, options)
+}
+
+/// [`load`], of a file that is in memory: messages call it `path`, and what it names is looked for beside that.
+pub fn decode(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Scene> {
     match is_gltf(path) {
-        true => gltf::load(path, options),
-        false => mitsuba::load::load(path, options),
+        true => gltf::decode(path, &bytes, options),
+        false => mitsuba::load::decode(path, bytes, options),
     }
 }
 

@@ -1,7 +1,7 @@
 //! EXR images of named channels, with provenance.
 
 use super::subsampled::{self, Subsampled};
-use super::{Provenance, atomic, primaries, seal};
+use super::{Provenance, atomic, could_hold, primaries, seal};
 use crate::base::math::Rgb;
 use crate::{Error, Result};
 use exr::prelude as e;
@@ -13,6 +13,8 @@ use std::path::Path;
 
 /// Most pixels that an image may have: untrusted files do not get to allocate more.
 const MAX_PIXELS: usize = 1 << 28;
+/// Bytes of a file that one thread reads.
+const SMALL: usize = 1 << 16;
 
 /// Samples of one channel, rows from the top.
 #[derive(Debug, Clone, PartialEq)]
@@ -175,7 +177,12 @@ impl ExrImage {
 
     /// Writes the file in one step.
     pub fn write(&self, path: &Path) -> Result<()> {
-        atomic::write(path, &self.to_bytes(path, e::Compression::ZIP16)?)
+        atomic::write(path, &self.encode(path)?)
+    }
+
+    /// The bytes that [`ExrImage::write`] writes.
+    pub fn encode(&self, path: &Path) -> Result<Vec<u8>> {
+        self.to_bytes(path, e::Compression::ZIP16)
     }
 
     /// [`ExrImage::write`] without compression: for large maps of floats, which hardly shrink and take longer to compress
@@ -195,9 +202,11 @@ impl ExrImage {
                     Samples::F32(v) => e::FlatSamples::F32(v.clone()),
                     Samples::U32(v) => e::FlatSamples::U32(v.clone()),
                 };
-                e::AnyChannel::new(name.as_str(), flat)
+                let name = e::Text::new_or_none(name);
+                name.map(|name| e::AnyChannel::new(name, flat)).ok_or("the name of a channel is not Latin-1")
             })
-            .collect();
+            .collect::<std::result::Result<_, _>>()
+            .map_err(|message| Error::input(path, message))?;
         let mut attributes = e::LayerAttributes::default();
         if let Some(p) = &self.provenance {
             // One attribute only: the crate keeps them in a hash map, whose order would differ from run to run.
@@ -218,8 +227,7 @@ impl ExrImage {
 
     /// Reads a file written by [`ExrImage::write`], or any flat EXR file.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|err| Error::io(path, err))?;
-        Self::from_bytes(path, &bytes)
+        Self::from_bytes(path, &super::read(path)?)
     }
 
     /// The provenance in a file's header, without its pixels; `None` where there is none.
@@ -252,20 +260,11 @@ impl ExrImage {
             return Ok(Self { width, height, channels, provenance: None, to_rec709 });
         }
         let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(bad)?;
-        for header in &meta.headers {
-            let size = header.layer_size;
-            if size.0.saturating_mul(size.1) > MAX_PIXELS {
-                return Err(Error::input(path, format!("{} x {} pixels are more than the {MAX_PIXELS} allowed", size.0, size.1)));
-            }
-        }
-        let image = e::read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .first_valid_layer()
-            .all_attributes()
-            .from_buffered(Cursor::new(bytes))
-            .map_err(bad)?;
+        check_sizes(&meta, bytes.len()).map_err(|m| Error::input(path, m))?;
+        let reader = e::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+        // Threads of its own cost the crate more than a small file does.
+        let reader = if bytes.len() < SMALL { reader.non_parallel() } else { reader };
+        let image = reader.from_buffered(Cursor::new(bytes)).map_err(bad)?;
         let layer = image.layer_data;
         let provenance = provenance(path, &layer.attributes)?;
         let named = image.attributes.chromaticities.as_ref();
@@ -285,6 +284,22 @@ impl ExrImage {
             })
             .collect();
         Ok(Self { width: layer.size.0, height: layer.size.1, channels, provenance, to_rec709 })
+    }
+}
+
+/// An error where a part has too many pixels, or all of them more than `bytes` could hold.
+fn check_sizes(meta: &exr::meta::MetaData, bytes: usize) -> std::result::Result<(), String> {
+    let mut all = 0u64;
+    for header in &meta.headers {
+        let (size, each) = (header.layer_size, header.channels.bytes_per_pixel as u64);
+        if size.0.saturating_mul(size.1) > MAX_PIXELS {
+            return Err(format!("{} x {} pixels are more than the {MAX_PIXELS} allowed", size.0, size.1));
+        }
+        all = all.saturating_add((size.0 as u64 * size.1 as u64).saturating_mul(each));
+    }
+    match could_hold(bytes, all) {
+        true => Ok(()),
+        false => Err(format!("{bytes} bytes cannot hold {all} bytes of pixels: not a whole image")),
     }
 }
 

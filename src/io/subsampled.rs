@@ -4,7 +4,7 @@
 //! A channel of sampling s has the pixels whose coordinates s divides; the others are interpolated between them. Luminance and chroma
 //! (`Y`, `RY`, `BY`) become red, green and blue.
 
-use super::primaries;
+use super::{could_hold, primaries};
 use std::io::Read;
 
 const SCAN_LINES_OF_ONE_PART: u32 = 2;
@@ -92,6 +92,10 @@ pub fn read(bytes: &[u8], most_pixels: usize) -> Result<Option<Subsampled>, Stri
     let size = [x1 - x0 + 1, y1 - y0 + 1].map(|n| usize::try_from(n).unwrap_or(0));
     if size[0] == 0 || size[1] == 0 || size[0].saturating_mul(size[1]) > most_pixels {
         return Err(format!("{} x {} pixels, expected some, and at most {most_pixels}", size[0], size[1]));
+    }
+    let all = (size[0] * size[1]) as u64 * 4 * channels.len() as u64;
+    if !could_hold(bytes.len(), all) {
+        return Err(format!("{} bytes cannot hold {all} bytes of pixels: not a whole image", bytes.len()));
     }
     for c in &mut channels {
         if c.sampling.iter().zip([x0, y0]).any(|(&s, low)| s == 0 || low % s as i64 != 0) || c.kind > 2 {

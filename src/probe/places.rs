@@ -2,7 +2,7 @@
 
 use super::neighbors;
 use super::placement::{PROBES_MAX, Placement, ProbeGrid, ProbeWeight, method};
-use crate::io::{Provenance, json};
+use crate::io::{Provenance, json, read_text};
 use crate::{Error, Result};
 use glam::Vec3;
 use serde::de::Error as _;
@@ -62,11 +62,18 @@ impl Places {
     /// # Errors
     /// It cannot be read, was changed since it was written, or holds neither a grid nor a list.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-        if method(path, &text)? == Placement::Grid {
-            return ProbeGrid::parse(path, &text).map(Self::Grid);
+        Self::parse(path, &read_text(path)?)
+    }
+
+    /// [`Places::read`], of a text; `path` is for messages.
+    ///
+    /// # Errors
+    /// It was changed since it was written, or holds neither a grid nor a list.
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        if method(path, text)? == Placement::Grid {
+            return ProbeGrid::parse(path, text).map(Self::Grid);
         }
-        let list: ProbeList = json::parse(path, &text)?;
+        let list: ProbeList = json::parse(path, text)?;
         list.check().map_err(|message| Error::input(path, message))?;
         Ok(Self::List(list))
     }

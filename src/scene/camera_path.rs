@@ -66,7 +66,8 @@ pub fn fps(path: &Path) -> Result<Option<f64>> {
     Ok(file.fps.filter(|fps| *fps > 0.0 && fps.is_finite()))
 }
 
-fn parse(path: &Path, text: &str, sensor: Option<&Camera>, unit_scale: f32) -> Result<Vec<Camera>> {
+/// [`load`], of a text; `path` is for messages.
+pub fn parse(path: &Path, text: &str, sensor: Option<&Camera>, unit_scale: f32) -> Result<Vec<Camera>> {
     let bad = |message: String| Error::input(path, message);
     let file: PathFile = json::written_by_hand(path, text)?;
     let Some(size) = file.size.or(sensor.map(|s| s.size)) else {

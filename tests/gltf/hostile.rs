@@ -16,14 +16,15 @@ fn error(path: &Path) -> String {
 fn what_is_wrong_is_said() {
     let folder = tempfile::tempdir().unwrap();
     type Change = fn(&mut Value);
-    let cases: [(Change, &str); 15] = [
+    let cases: [(Change, &str); 16] = [
         (|j| j["asset"]["version"] = json!("1.0"), "version 1.0"),
         (|j| j["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "children": [1] }]), "child of two nodes"),
         (|j| j["nodes"][0]["mesh"] = json!(7), "no mesh 7"),
         (|j| j["scenes"] = json!([{ "nodes": [9] }]), "no node 9"),
         (|j| j["meshes"][0]["primitives"][0]["material"] = json!(1), "no material 1"),
-        (|j| j["accessors"][0]["count"] = json!(4_000_000_000u64), "elements of 12 bytes"),
-        (|j| j["accessors"][0]["count"] = json!(u64::MAX), "elements of 12 bytes"),
+        (|j| j["accessors"][0]["count"] = json!(5), "5 elements of 12 bytes"),
+        (|j| j["accessors"][0]["count"] = json!(u64::MAX), "18446744073709551615 vertices"),
+        (|j| j["accessors"][1]["count"] = json!(u64::MAX), "elements of 12 bytes"),
         (|j| j["accessors"][0]["type"] = json!("VEC2"), "expected 3"),
         (|j| j["bufferViews"][0]["byteLength"] = json!(u64::MAX), "buffer view 0 asks for"),
         (|j| j["bufferViews"][0]["byteStride"] = json!(0), "0 apart"),
@@ -47,7 +48,7 @@ fn what_is_wrong_is_said() {
 fn zeros_without_data_are_bounded() {
     let folder = tempfile::tempdir().unwrap();
     let mut document = with_material(json!({}));
-    document.json["accessors"][0] = json!({ "componentType": F32, "count": 3_000_000_000u64, "type": "VEC3" });
+    document.json["accessors"][0] = json!({ "componentType": F32, "count": 3_000_000, "type": "VEC3" });
     assert!(error(&document.glb(folder.path())).contains("without data"));
 }
 
@@ -78,9 +79,9 @@ fn files_elsewhere_are_not_fetched_and_nesting_ends() {
     assert!(load(&document.glb(folder.path()), &LoadOptions::default()).is_ok());
 }
 
-/// Every file that is cut short, and two thousand with bytes changed, load or say what is wrong.
+/// No file that is cut short loads; changed ones: `tests/fuzz.rs`.
 #[test]
-fn cut_and_changed_files_do_no_harm() {
+fn cut_files_do_no_harm() {
     let folder = tempfile::tempdir().unwrap();
     let mut document = with_material(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }));
     document.json["textures"] = json!([{ "source": 0, "sampler": 0 }]);
@@ -95,20 +96,4 @@ fn cut_and_changed_files_do_no_harm() {
     };
     assert!(tried(&bytes));
     assert!((0..bytes.len() - 3).step_by(7).all(|end| !tried(&bytes[..end])));
-    let mut state = 1u64;
-    let mut draw = |n: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % n
-    };
-    let mut refused = 0;
-    for _ in 0..2000 {
-        let mut changed = bytes.clone();
-        for _ in 0..1 + draw(3) {
-            let (at, value) = (draw(changed.len()), draw(256) as u8);
-            // Digits to digits, so that the JSON often stays whole and its numbers do not.
-            changed[at] = if changed[at].is_ascii_digit() { b'0' + value % 10 } else { value };
-        }
-        refused += usize::from(!tried(&changed));
-    }
-    assert!((200..2000).contains(&refused), "{refused}");
 }

@@ -45,8 +45,15 @@ impl Animation {
     /// # Errors
     /// It is no such file, with the line or the entry; the scene has not what it names; a mesh cannot be read; or it asks for too much.
     pub fn load(path: &Path, scene: &Scene) -> Result<Self> {
-        let text = read_text(path)?;
-        let file: LightsFile = json::written_by_hand(path, &text)?;
+        Self::parse(path, &read_text(path)?, scene)
+    }
+
+    /// [`Animation::load`], of a text: messages call it `path`, and meshes are looked for beside that.
+    ///
+    /// # Errors
+    /// As of [`Animation::load`].
+    pub fn parse(path: &Path, text: &str, scene: &Scene) -> Result<Self> {
+        let file: LightsFile = json::written_by_hand(path, text)?;
         let bad = |message: String| Error::input(path, message);
         for (name, list) in
             [("lights", &file.lights), ("materials", &file.materials), ("emission", &file.emission), ("objects", &file.objects)]

@@ -2,6 +2,7 @@
 //!
 //! The schema is the crate `gltf_json`'s, asked through [`File::get`] alone: the crate `gltf` on top of it panics where a file refers to what it does not have.
 
+use crate::io::read_named;
 use crate::{Error, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -45,13 +46,12 @@ pub struct File {
 }
 
 impl File {
-    /// Reads a `.gltf` or `.glb` file, whichever its first bytes say, and all buffers. Fills `warnings` with what is left out.
-    pub fn open(path: &Path, skip_unsupported: bool, warnings: &mut Vec<String>) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    /// Reads the bytes of a `.gltf` or `.glb` file, whichever the first of them say, and all buffers. Fills `warnings` with what is left out.
+    pub fn open(path: &Path, bytes: &[u8], skip_unsupported: bool, warnings: &mut Vec<String>) -> Result<Self> {
         let bad = |message: String| Error::input(path, message);
         let (json, binary) = match bytes.starts_with(MAGIC) {
-            true => chunks(&bytes).map_err(|e| bad(format!("not a whole GLB file: {e}")))?,
-            false => (&bytes[..], None),
+            true => chunks(bytes).map_err(|e| bad(format!("not a whole GLB file: {e}")))?,
+            false => (bytes, None),
         };
         let mut value: Value = serde_json::from_slice(json).map_err(|e| bad(format!("not glTF: {e}")))?;
         let version = value["asset"]["version"].as_str().unwrap_or("none");
@@ -102,8 +102,12 @@ impl File {
                 false => Ok(percent_decode_str(data).collect()),
             };
         }
-        let file = self.beside(uri)?;
-        std::fs::read(&file).map_err(|e| Error::io(file, e))
+        read_named(&self.beside(uri)?).map_err(|e| self.error(e.to_string()))
+    }
+
+    /// Bytes of all buffers.
+    pub fn buffered(&self) -> usize {
+        self.buffers.iter().map(Vec::len).sum()
     }
 
     /// The file that a relative URI names.

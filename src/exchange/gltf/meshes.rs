@@ -52,10 +52,16 @@ pub fn part(file: &File, primitive: &Primitive, set: u32, weights: &[f32]) -> Re
     Ok((!mesh.triangles.is_empty()).then_some(Part { mesh, colors }))
 }
 
+/// How many vertices a primitive says that it has, nothing of it read.
+pub fn vertex_count(root: &Root, primitive: &Primitive) -> u64 {
+    let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+    positions.and_then(|index| root.get(*index)).map_or(0, |accessor| accessor.count.0)
+}
+
 /// How many triangles a primitive says that it has, nothing of it read.
 pub fn triangle_count(root: &Root, primitive: &Primitive) -> u64 {
-    let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).copied();
-    let corners = primitive.indices.or(positions).and_then(|index| root.get(index)).map_or(0, |accessor| accessor.count.0);
+    let corners = primitive.indices.and_then(|index| root.get(index)).map(|accessor| accessor.count.0);
+    let corners = corners.unwrap_or_else(|| vertex_count(root, primitive));
     match primitive.mode {
         Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => corners.saturating_sub(2),
         _ => corners / 3,

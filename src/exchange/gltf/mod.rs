@@ -27,13 +27,13 @@ use std::path::Path;
 use std::sync::Arc;
 use textures::Textures;
 
-/// Loads a glTF file.
-pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
+/// Loads the bytes of a glTF file.
+pub fn decode(path: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene> {
     if let Some((name, _)) = options.defines.first() {
         return Err(Error::input(path, format!("-D {name}: a glTF file has no parameters")));
     }
     let mut warnings = Vec::new();
-    let file = File::open(path, options.skip_unsupported, &mut warnings)?;
+    let file = File::open(path, bytes, options.skip_unsupported, &mut warnings)?;
     let looks = looks(&file, options.allow_truncated, &mut warnings)?;
     finish::in_metres(path, options.unit_scale, |unit_scale| {
         let scene = Scene { path: path.to_owned(), warnings: warnings.clone(), unit_scale, ..Scene::default() };
@@ -97,17 +97,25 @@ impl Builder<'_> {
         Ok(self.scene)
     }
 
-    /// An error where the triangles would be too many, before the first is read.
+    /// An error where the triangles or their vertices would be too many, before the first is read.
     fn count(&self, shown: &[usize]) -> Result<()> {
+        type Count = fn(&gltf_json::Root, &Primitive) -> u64;
+        let counts: [(&str, Count, usize); 2] = [
+            ("triangles", meshes::triangle_count, MAX_TRIANGLES),
+            // Primitives may share the vertices that each then has a copy of.
+            ("vertices", meshes::vertex_count, 3 * MAX_TRIANGLES),
+        ];
         let root = &self.file.root;
-        let of_mesh: Vec<u64> =
-            root.meshes.iter().map(|mesh| mesh.primitives.iter().map(|p| meshes::triangle_count(root, p)).sum()).collect();
-        let of_node = |i: &usize| root.nodes[*i].mesh.and_then(|mesh| of_mesh.get(mesh.value())).copied().unwrap_or(0);
-        let all = shown.iter().map(of_node).fold(0, u64::saturating_add);
-        match all > MAX_TRIANGLES as u64 {
-            true => Err(self.file.error(format!("the scene has {all} triangles, expected at most {MAX_TRIANGLES}"))),
-            false => Ok(()),
+        for (what, count, most) in counts {
+            let of = |primitives: &[Primitive]| primitives.iter().map(|p| count(root, p)).fold(0, u64::saturating_add);
+            let of_mesh: Vec<u64> = root.meshes.iter().map(|mesh| of(&mesh.primitives)).collect();
+            let of_node = |i: &usize| root.nodes[*i].mesh.and_then(|mesh| of_mesh.get(mesh.value())).copied().unwrap_or(0);
+            let all = shown.iter().map(of_node).fold(0, u64::saturating_add);
+            if all > most as u64 {
+                return Err(self.file.error(format!("the scene has {all} {what}, expected at most {most}")));
+            }
         }
+        Ok(())
     }
 
     fn mesh(&mut self, node: &Node, number: usize, placed: &[DMat4]) -> Result<()> {

@@ -5,7 +5,7 @@ pub mod ply;
 pub mod serialized;
 
 use crate::base::math::Rgb;
-use crate::scene::mesh::Mesh;
+use crate::scene::mesh::{self, Mesh};
 
 /// What a mesh file holds.
 #[derive(Debug, Default, Clone)]
@@ -14,6 +14,19 @@ pub struct MeshFile {
     pub mesh: Mesh,
     /// Values of its vertices or faces, for `mesh_attribute` textures.
     pub attributes: Vec<MeshAttribute>,
+}
+
+impl MeshFile {
+    /// `Err` with what is wrong where a triangle asks for a vertex that is not there, or a number is not finite.
+    fn check(&self) -> std::result::Result<(), String> {
+        mesh::check(&self.mesh)?;
+        for MeshAttribute { name, values } in &self.attributes {
+            if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+                return Err(format!("{name} {i} is {}, expected finite numbers", values[i]));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Values of a mesh's vertices or triangles.

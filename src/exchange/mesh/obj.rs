@@ -6,7 +6,8 @@
 //! on in the next, as the format has it; colours after a position are the attribute `vertex_color`.
 
 use super::{MeshAttribute, MeshFile};
-use crate::scene::mesh::{Mesh, check};
+use crate::io::read_named;
+use crate::scene::mesh::Mesh;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 use std::borrow::Cow;
@@ -18,7 +19,7 @@ const NONE: u32 = u32::MAX;
 
 /// Reads an OBJ file.
 pub fn load(path: &Path) -> Result<MeshFile> {
-    parse(&std::fs::read(path).map_err(|e| Error::io(path, e))?, path)
+    parse(&read_named(path)?, path)
 }
 
 /// Reads the bytes of an OBJ file; `path` is for messages.
@@ -37,7 +38,7 @@ pub fn parse(text: &[u8], path: &Path) -> Result<MeshFile> {
         return Err(Error::input(path, "no faces found, expected at least one \"f\" line"));
     }
     let file = lines.into_file();
-    check(&file.mesh).map_err(|e| Error::input(path, e))?;
+    file.check().map_err(|e| Error::input(path, e))?;
     Ok(file)
 }
 

@@ -5,6 +5,7 @@
 //! colours and indices, all little-endian.
 
 use super::{MeshAttribute, MeshFile};
+use crate::io::read_named;
 use crate::scene::mesh::Mesh;
 use crate::{Error, Result};
 use flate2::bufread::ZlibDecoder;
@@ -17,16 +18,18 @@ const HAS_NORMALS: u32 = 0x0001;
 const HAS_UVS: u32 = 0x0002;
 const HAS_COLORS: u32 = 0x0008;
 const DOUBLE: u32 = 0x2000;
+/// Longest name, bytes.
+const MAX_NAME: usize = 1 << 16;
 
 /// Reads mesh `shape_index` of a serialized file.
 pub fn load(path: &Path, shape_index: usize) -> Result<MeshFile> {
-    parse(&std::fs::read(path).map_err(|e| Error::io(path, e))?, shape_index, path)
+    parse(&read_named(path)?, shape_index, path)
 }
 
 /// Reads mesh `shape_index` from the bytes of a serialized file; `path` is for messages.
 pub fn parse(bytes: &[u8], shape_index: usize, path: &Path) -> Result<MeshFile> {
     let file = decode(bytes, shape_index).map_err(|e| Error::input(path, e))?;
-    crate::scene::mesh::check(&file.mesh).map_err(|e| Error::input(path, format!("mesh {shape_index}: {e}")))?;
+    file.check().map_err(|e| Error::input(path, format!("mesh {shape_index}: {e}")))?;
     Ok(file)
 }
 
@@ -119,8 +122,12 @@ impl<R: Read> Stream<R> {
     }
 
     fn skip_name(&mut self) -> std::result::Result<(), String> {
-        while self.bytes(1, "name")?[0] != 0 {}
-        Ok(())
+        for _ in 0..MAX_NAME {
+            if self.bytes(1, "name")?[0] == 0 {
+                return Ok(());
+            }
+        }
+        Err(format!("the name has more than {MAX_NAME} bytes"))
     }
 
     fn floats(&mut self, vertices: u64, each: u64, wide: bool, what: &str) -> std::result::Result<Vec<f32>, String> {

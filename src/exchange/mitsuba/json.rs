@@ -9,7 +9,6 @@
 use super::spectrum;
 use super::transform::Steps;
 use super::tree::{Folders, Kind, Lines, Location, MAX_DEPTH, Node, Param, Parsed, Value, snake_case};
-use crate::io::read_text;
 use crate::{Error, Result};
 use glam::{DMat4, DVec3};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
@@ -17,11 +16,10 @@ use serde_json::value::RawValue;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Parses a file.
-pub fn parse(path: &Path, defines: &[(String, String)]) -> Result<Parsed> {
-    let text = read_text(path)?;
+/// Parses the text of a file.
+pub fn parse(path: &Path, text: &str, defines: &[(String, String)]) -> Result<Parsed> {
     // Some editors begin a file with a byte order mark.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let root: &RawValue =
         serde_json::from_str(text).map_err(|e| Error::at_line(path, e.line() as u32, format!("not well-formed JSON: {e}")))?;
     let reader = Reader { text, lines: Lines::new(text), file: path.into(), folders: Folders::of(path) };

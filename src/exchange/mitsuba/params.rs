@@ -6,7 +6,7 @@ use super::tree::{Kind, Location, Node, Param, Value};
 use crate::Result;
 use crate::base::math::Rgb;
 use glam::{DMat4, Vec3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The plugins that references mean.
@@ -256,8 +256,9 @@ impl<'a> Params<'a> {
     /// Warns of what was not taken.
     pub fn finish(self, warnings: &mut Vec<String>) {
         warnings.extend(self.odd);
-        for (i, p) in self.node.params.iter().enumerate() {
-            if !p.name.is_empty() && self.node.params[..i].iter().any(|q| q.name == p.name) {
+        let mut seen = BTreeSet::new();
+        for p in &self.node.params {
+            if !seen.insert(&p.name) && !p.name.is_empty() {
                 warnings.push(p.at.warning(format!("{}: {} is given again: the last one counts", self.node.plugin, p.name)));
             }
         }

@@ -5,7 +5,7 @@
 
 use super::tree::Value;
 use crate::base::math::{Rgb, linear_from_srgb};
-use crate::io::read_text;
+use crate::io::{read_named, text};
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -66,7 +66,7 @@ pub fn parse(text: &str) -> std::result::Result<Value, String> {
 /// A file of lines `wavelength value`, `#` for comments.
 pub fn parse_file(path: &Path) -> Result<Value> {
     let mut pairs = Vec::new();
-    for (i, line) in read_text(path)?.lines().enumerate() {
+    for (i, line) in text(path, read_named(path)?)?.lines().enumerate() {
         let content = line.split('#').next().unwrap_or_default();
         match numbers(content).map_err(|m| Error::at_line(path, i as u32 + 1, m))?.as_slice() {
             [] => {}

@@ -134,6 +134,14 @@ pub struct Node {
     pub params: Vec<Param>,
 }
 
+impl Node {
+    /// Its parameters and those of all plugins within, and itself.
+    pub fn size(&self) -> usize {
+        let of = |p: &Param| if let Value::Plugin(node) = &p.value { node.size() } else { 1 };
+        1 + self.params.iter().map(of).sum::<usize>()
+    }
+}
+
 /// A scene file as it was read.
 #[derive(Debug, Default)]
 pub struct Parsed {

@@ -6,10 +6,11 @@ use super::document::{self, Element};
 use super::spectrum;
 use super::transform::Steps;
 use super::tree::{Folders, Kind, Location, MAX_DEPTH, Node, Param, Parsed, Value, snake_case};
+use crate::io::read_named;
 use crate::{Error, Result};
 use glam::DVec3;
-use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::cell::{Cell, RefCell};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -17,9 +18,13 @@ use std::sync::Arc;
 const MAX_INCLUDES: usize = 16;
 /// Most files of a scene: includes that include twice would multiply without end.
 const MAX_FILES: usize = 1000;
+/// Most bytes that parameters stand for in all: those of parameters of parameters would multiply without end.
+const MAX_STOOD_FOR: usize = 100_000_000;
+/// Most parameters that aliases copy.
+const MAX_COPIED: usize = 1_000_000;
 
-/// Parses a file and all that it includes.
-pub fn parse(path: &Path, defines: &[(String, String)]) -> Result<Parsed> {
+/// Parses the bytes of a file, and all files that it includes.
+pub fn parse(path: &Path, bytes: &[u8], defines: &[(String, String)]) -> Result<Parsed> {
     let mut reader = Reader {
         values: defines.to_vec(),
         used: RefCell::default(),
@@ -27,9 +32,10 @@ pub fn parse(path: &Path, defines: &[(String, String)]) -> Result<Parsed> {
         open: Vec::new(),
         files: 0,
         aliases: Vec::new(),
+        stood_for: Cell::new(0),
         parsed: Parsed::default(),
     };
-    reader.file(path)?;
+    reader.file(path, bytes)?;
     reader.add_aliases()?;
     let used = reader.used.into_inner();
     if let Some((name, value)) = defines.iter().find(|(name, _)| !used.contains(name)) {
@@ -53,6 +59,8 @@ struct Reader {
     files: usize,
     /// (id, its second name, where).
     aliases: Vec<(String, String, Location)>,
+    /// Bytes that parameters have stood for so far.
+    stood_for: Cell<usize>,
     parsed: Parsed,
 }
 
@@ -66,11 +74,11 @@ impl Source {
 }
 
 impl Reader {
-    fn file(&mut self, path: &Path) -> Result<()> {
-        let (root, odd) = document::parse(path, &std::fs::read(path).map_err(|e| Error::io(path, e))?)?;
+    fn file(&mut self, path: &Path, bytes: &[u8]) -> Result<()> {
+        let (root, odd) = document::parse(path, bytes)?;
         self.parsed.warnings.extend(odd);
         let source = Source(path.into());
-        self.open.push(path.canonicalize().map_err(|e| Error::io(path, e))?);
+        self.open.push(whole(path));
         self.folders.add_of(path);
         match root.tag.as_str() {
             "scene" => {
@@ -107,8 +115,7 @@ impl Reader {
             "include" => {
                 let name = self.attribute(&at, element, "filename")?;
                 let file = self.folders.find(&name, &at)?;
-                let full = file.canonicalize().map_err(|e| Error::io(&file, e))?;
-                if self.open.contains(&full) {
+                if self.open.contains(&whole(&file)) {
                     return Err(at.error(format!("\"{name}\" includes itself")));
                 }
                 if self.open.len() >= MAX_INCLUDES {
@@ -118,7 +125,7 @@ impl Reader {
                 if self.files > MAX_FILES {
                     return Err(at.error(format!("more than {MAX_FILES} files are included")));
                 }
-                self.file(&file)?;
+                self.file(&file, &read_named(&file)?)?;
             }
             _ => {
                 let child = self.param(source, element, None, 0)?;
@@ -130,13 +137,23 @@ impl Reader {
 
     /// A second name for a plugin is a copy of it under that name.
     fn add_aliases(&mut self) -> Result<()> {
+        let mut places = BTreeMap::new();
+        for (i, child) in self.parsed.children.iter().enumerate() {
+            if let Value::Plugin(Node { id: Some(id), .. }) = &child.value {
+                places.entry(id.clone()).or_insert(i);
+            }
+        }
+        let mut copied = 0;
         for (id, second, at) in std::mem::take(&mut self.aliases) {
-            let node = self.parsed.children.iter().find_map(|c| match &c.value {
-                Value::Plugin(n) if n.id.as_ref() == Some(&id) => Some(n.clone()),
-                _ => None,
-            });
-            let mut node = node.ok_or_else(|| at.error(format!("alias: nothing has the id \"{id}\"")))?;
-            node.id = Some(second);
+            let Some(Value::Plugin(node)) = places.get(&id).map(|&i| &self.parsed.children[i].value) else {
+                return Err(at.error(format!("alias: nothing has the id \"{id}\"")));
+            };
+            copied += node.size();
+            if copied > MAX_COPIED {
+                return Err(at.error(format!("alias: more than {MAX_COPIED} parameters are copied")));
+            }
+            let node = Node { id: Some(second.clone()), ..node.clone() };
+            places.entry(second).or_insert(self.parsed.children.len());
             self.parsed.children.push(Param { name: String::new(), at, value: Value::Plugin(node) });
         }
         Ok(())
@@ -271,12 +288,21 @@ impl Reader {
                 return Err(at.error(format!("the parameter \"${name}\" has no value: no <default>, no --define")));
             };
             self.used.borrow_mut().insert(name.clone());
+            self.stood_for.set(self.stood_for.get() + value.len());
+            if self.stood_for.get() > MAX_STOOD_FOR {
+                return Err(at.error(format!("the parameters stand for more than {MAX_STOOD_FOR} bytes in all")));
+            }
             out.push_str(value);
             rest = &rest[name.len()..];
         }
         out.push_str(rest);
         Ok(out)
     }
+}
+
+/// A file's one name, by which an include that goes in circles is known; as it is where there is no such file.
+fn whole(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 fn number(at: &Location, text: &str) -> Result<f64> {

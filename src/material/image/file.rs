@@ -2,9 +2,9 @@
 
 use super::{Image, Pixels};
 use crate::base::math::{Rgb, linear_from_srgb};
-use crate::io::ExrImage;
+use crate::io::{ExrImage, could_hold, read_named};
 use crate::{Error, Result};
-use image::{DynamicImage, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader};
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
@@ -38,8 +38,7 @@ pub struct ReadOptions {
 /// Reads a file, and tells what was odd about it. Integer pixels are what [`Take`] says; floats are linear already, those of an
 /// EXR file turned into Rec.709.
 pub fn read(path: &Path, options: ReadOptions) -> Result<(Image, Vec<String>)> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    decode(path, &bytes, options)
+    decode(path, &read_named(path)?, options)
 }
 
 /// [`read`], of a file that is in memory; messages call it `path`.
@@ -141,13 +140,24 @@ fn read_other(path: &Path, bytes: &[u8], options: ReadOptions, odd: &mut Vec<Str
         }
         Some(_) => {}
     }
+    reader.limits(limits());
+    let decoder = reader.into_decoder().map_err(bad)?;
+    let (width, height) = decoder.dimensions();
+    check_size(path, width as usize, height as usize)?;
+    limits().reserve(decoder.total_bytes()).map_err(bad)?;
+    let bits = u64::from(width) * u64::from(height) * u64::from(decoder.original_color_type().bits_per_pixel());
+    if !could_hold(bytes.len(), bits / 8) {
+        let message = format!("{} bytes cannot hold {width} x {height} pixels: not a whole image", bytes.len());
+        return Err(Error::input(path, message));
+    }
+    DynamicImage::from_decoder(decoder).map(|decoded| linear(decoded, options.take)).map_err(bad)
+}
+
+fn limits() -> image::Limits {
     let mut limits = image::Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
     limits.max_alloc = Some(MAX_BYTES);
-    reader.limits(limits);
-    let decoded = reader.decode().map_err(bad)?;
-    check_size(path, decoded.width() as usize, decoded.height() as usize)?;
-    Ok(linear(decoded, options.take))
+    limits
 }
 
 fn linear(decoded: DynamicImage, take: Take) -> Image {

@@ -3,6 +3,9 @@
 use crate::{Error, Result};
 use std::path::Path;
 
+/// Most elements, and most properties of one: each is compared with all.
+const MAX_PARTS: usize = 1000;
+
 /// How numbers are written after the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
@@ -137,6 +140,9 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
                     let message = format!("declares {count} elements \"{name}\", but the file has only {} bytes", bytes.len());
                     return Err(Error::at_line(path, number, message));
                 }
+                if elements.iter().any(|e| e.name == *name) || elements.len() == MAX_PARTS {
+                    return Err(bad("each element once, and few of them"));
+                }
                 elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
             }
             ["property", rest @ ..] => {
@@ -148,7 +154,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
                     [kind, name] => Property { name: (*name).into(), kind: scalar(kind)?, list: None },
                     _ => return Err(bad("property TYPE NAME or property list TYPE TYPE NAME")),
                 };
-                elements.last_mut().ok_or_else(|| bad("an element before its properties"))?.properties.push(property);
+                let of = elements.last_mut().ok_or_else(|| bad("an element before its properties"))?;
+                if of.properties.len() == MAX_PARTS {
+                    return Err(bad("fewer properties"));
+                }
+                of.properties.push(property);
             }
             ["end_header"] => break,
             _ => return Err(bad("format, comment, element, property or end_header")),

@@ -11,7 +11,8 @@ mod header;
 mod numbers;
 
 use super::{MeshAttribute, MeshFile};
-use crate::scene::mesh::{Mesh, check};
+use crate::io::read_named;
+use crate::scene::mesh::Mesh;
 use crate::{Error, Result};
 use attributes::Channels;
 use glam::{Vec2, Vec3};
@@ -29,7 +30,7 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Reads a PLY file.
 pub fn load(path: &Path) -> Result<MeshFile> {
-    parse(&std::fs::read(path).map_err(|e| Error::io(path, e))?, path)
+    parse(&read_named(path)?, path)
 }
 
 /// Reads the bytes of a PLY file; `path` is for messages.
@@ -48,6 +49,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<MeshFile> {
         match element.name.as_str() {
             "vertex" => vertices(element, &mut numbers, &mut file)?,
             "face" => faces.read(element, &mut numbers, &mut file)?,
+            _ if element.properties.is_empty() => {}
             _ => {
                 let mut skipped = Vec::new();
                 for _ in 0..element.count {
@@ -56,10 +58,10 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<MeshFile> {
             }
         }
     }
-    check(&file.mesh).map_err(|e| Error::input(path, e))?;
+    file.check().map_err(|e| Error::input(path, e))?;
     if !faces.corner_uvs.is_empty() && file.mesh.uvs.is_empty() {
         take_apart(&mut file, &faces.corner_uvs);
-        check(&file.mesh).map_err(|e| Error::input(path, e))?;
+        file.check().map_err(|e| Error::input(path, e))?;
     }
     Ok(file)
 }

@@ -16,6 +16,7 @@ use super::params::{Ids, Params};
 use super::tree::{Kind, Node, Param, Parsed, Value};
 use super::{json, xml};
 use crate::exchange::{LoadOptions, finish};
+use crate::io::text;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use attribute::Current;
@@ -27,11 +28,12 @@ use std::path::Path;
 /// Most scattering models and textures in a scene: references to references could multiply without end.
 const MAX_BUILT: usize = 200_000;
 
-/// Loads a Mitsuba XML file, or its JSON form (a file named `.json`).
-pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let Parsed { children, mut warnings } =
-        if is_json { json::parse(path, &options.defines)? } else { xml::parse(path, &options.defines)? };
+/// Loads the bytes of a Mitsuba XML file, or of its JSON form (a file named `.json`).
+pub fn decode(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Scene> {
+    let Parsed { children, mut warnings } = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+        true => json::parse(path, &text(path, bytes)?, &options.defines)?,
+        false => xml::parse(path, &bytes, &options.defines)?,
+    };
     let ids = ids(&children)?;
     let assets = Assets::load(&children, options.allow_truncated)?;
     warnings.extend_from_slice(assets.warnings());
