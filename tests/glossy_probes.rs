@@ -6,8 +6,8 @@ use reprobe::base::progress::Silent;
 use reprobe::exchange::{LoadOptions, load};
 use reprobe::io::Provenance;
 use reprobe::lightmap::lookup::sides;
-use reprobe::lightmap::{Atlas, AtlasParams};
-use reprobe::method::glossy_probes::bake::{Bake, ProbeBakeParams, bake_glossy, probe_geometry};
+use reprobe::lightmap::{Atlas, AtlasParams, DenoiseParams};
+use reprobe::method::glossy_probes::bake::{Bake, ProbeBakeParams, Traced, bake_glossy, probe_geometry};
 use reprobe::method::glossy_probes::candidates::{Candidates, WeightedProbe};
 use reprobe::method::glossy_probes::coverage::{CoverageParams, SubPixels, covered_pixels};
 use reprobe::method::glossy_probes::gather::{GatherParams, Gathered, SearchLevel, gather};
@@ -389,25 +389,41 @@ fn texel_coordinates_wrap_around_and_stop_at_the_poles() {
     assert!(std::ptr::eq(probe.texel(Vec2::new(-0.5, -2.0)), &raw const probe.texels[7]));
 }
 
+/// What was traced of a reflector on the room's wall, and the glossy colours of the probe before it.
+fn baked(reflector: &str, params: &ProbeBakeParams, seed: u32) -> (Traced, Vec<Vec3>) {
+    let lift = r#"<transform name="to_world"><translate value="0,0,0.1"/></transform>"#;
+    let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{lift}{reflector}</shape>"#)));
+    let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([64, 32]));
+    let bake = Bake { world: &world, params, seed, lightmap: None, device: None };
+    let traced = bake_glossy(&bake, &mut probe, 0, &|_| true, &Silent).unwrap();
+    (traced, probe.texels.iter().map(|t| t.glossy()).collect())
+}
+
+#[test]
+fn noise_goes_and_what_mirrors_show_stays() {
+    let denoise = Some(DenoiseParams::default());
+    let of = |reflector: &str, spp: u32, denoise, seed| {
+        baked(reflector, &ProbeBakeParams { spp, denoise, ..ProbeBakeParams::default() }, seed).1
+    };
+    assert_eq!(of(MIRROR, 4, denoise, 1), of(MIRROR, 4, None, 1));
+
+    let rough = r#"<bsdf type="roughconductor"><float name="alpha" value="0.3"/><string name="material" value="none"/></bsdf>"#;
+    let exact = of(rough, 2048, None, 2);
+    let error = |found: &[Vec3]| {
+        let lit = found.iter().zip(&exact).filter(|(_, e)| e.element_sum() > 0.0);
+        let (sum, count) = lit.fold((0.0, 0), |(sum, n), (f, e)| (sum + ((*f - *e) / e.element_sum()).length_squared(), n + 1));
+        (sum / count as f32).sqrt()
+    };
+    let (noisy, clean) = (error(&of(rough, 8, None, 1)), error(&of(rough, 8, denoise, 1)));
+    assert!(clean < 0.6 * noisy, "{clean} of {noisy}");
+}
+
 #[test]
 fn adaptive_sampling_spends_paths_where_they_are_needed() {
     const ERROR: f32 = 0.1;
     const MOST: u32 = 1024;
     let bake = |reflector: &str, error: Option<f32>, seed: u32| {
-        let lift = r#"<transform name="to_world"><translate value="0,0,0.1"/></transform>"#;
-        let (world, _) = World::opaque(room(&format!(r#"<shape type="rectangle">{lift}{reflector}</shape>"#)));
-        let mut probe = probe_geometry(&world, Vec3::new(0.2, 0.1, 2.0), ParameterMap::identity([64, 32]));
-        let params = ProbeBakeParams { spp: MOST, error, roughness_scale: 0.5, ..ProbeBakeParams::default() };
-        let traced = bake_glossy(
-            &Bake { world: &world, params: &params, seed, lightmap: None, device: None },
-            &mut probe,
-            0,
-            &|_| true,
-            &Silent,
-        )
-        .unwrap();
-        let glossy: Vec<Vec3> = probe.texels.iter().map(|t| t.glossy()).collect();
-        (traced, glossy)
+        baked(reflector, &ProbeBakeParams { spp: MOST, error, roughness_scale: 0.5, ..ProbeBakeParams::default() }, seed)
     };
     let (mirror, _) = bake(MIRROR, Some(ERROR), 1);
     assert!(mirror.texels > 40 && mirror.paths == 8 * mirror.texels, "a mirror's paths all agree: {mirror:?}");

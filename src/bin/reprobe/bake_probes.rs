@@ -15,6 +15,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 256
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --shard 0/4
+  reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --lightmap lightmap.exr --spp 32 --denoise
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --lightmap lightmap.exr --error 0.05 --spp 512
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 128 \\
       --for-path path.json --curvature curvature.exr --size 480x270 --supersample 2")]
@@ -39,6 +40,9 @@ pub struct Args {
     /// Factor on roughness at the first glossy vertex [default: 1; with --paper 0.5]
     #[arg(long, value_name = "S")]
     roughness_scale: Option<f32>,
+    /// Take the noise out of the texels, by a filter along each reflector that keeps what differs by more than the noise
+    #[arg(long)]
+    denoise: bool,
     /// Spread a texel's paths over its solid angle, in place of sending all through its centre
     #[arg(long)]
     spread: bool,
@@ -86,6 +90,7 @@ impl Args {
             spp: Some(self.spp),
             error: self.error,
             roughness_scale: self.roughness_scale,
+            denoise: self.denoise,
             spread: self.spread,
             lightmap: self.lightmap,
             shard: self.shard,

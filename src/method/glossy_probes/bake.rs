@@ -1,11 +1,12 @@
 //! Baking a probe: reflector, mirror-reflected and glossy maps at the resolution that its parameterisation gives (§4.1, §4.2.2, §6.1).
 
-use crate::Result;
+use super::denoise::denoised;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{Parameters, within};
 use crate::base::progress::Progress;
 use crate::base::ray::{Hit, Ray};
-use crate::lightmap::LightMap;
+use crate::lightmap::denoise::Light;
+use crate::lightmap::{DenoiseParams, LightMap};
 use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
@@ -16,6 +17,7 @@ use crate::transport::path::{KnownDiffuse, PathParams};
 use crate::view::gbuffer::is_glossy;
 use crate::view::mirror::mirror_hit;
 use crate::view::mirror_light::mirror_light;
+use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -41,11 +43,14 @@ pub struct ProbeBakeParams {
     /// sending all through the centre. *Ours*: a spread texel mixes what a mirror shows on both sides of an edge, and the gather
     /// then finds a bright colour where the geometry maps promise a dark surface; so it is off by default.
     pub spread: bool,
+    /// How the noise is taken out of a probe's texels; `None`: it stays. *Ours*.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoise: Option<DenoiseParams>,
 }
 
 impl Default for ProbeBakeParams {
     fn default() -> Self {
-        Self { spp: 2048, error: None, roughness_scale: 1.0, spread: false }
+        Self { spp: 2048, error: None, roughness_scale: 1.0, spread: false, denoise: None }
     }
 }
 
@@ -59,6 +64,12 @@ impl ProbeBakeParams {
 impl Parameters for ProbeBakeParams {
     fn validate(&self) -> Result<()> {
         within("spp", self.spp, 1..=1 << 24)?;
+        if let Some(denoise) = &self.denoise {
+            denoise.validate()?;
+            if self.spp == 1 {
+                return Err(Error::Request("--denoise: one path tells nothing of its noise; give --spp 2 or more".into()));
+            }
+        }
         self.error.map_or(Ok(()), |e| within("error", e, f32::MIN_POSITIVE..=1e9))?;
         within("roughness_scale", self.roughness_scale, f32::MIN_POSITIVE..=1.0)
     }
@@ -119,7 +130,7 @@ pub struct Traced {
 
 /// Sums over the paths of one texel, and how many they were.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+pub(super) struct Sums {
     paths: u32,
     of: PathSum,
 }
@@ -128,12 +139,19 @@ impl Sums {
     fn and(self, other: Self) -> Self {
         Self { paths: self.paths + other.paths, of: self.of + other.of }
     }
+
+    /// The mean, and the variance of its luminance; of one path that is not known.
+    pub(super) fn light(&self) -> Light {
+        let n = f64::from(self.paths);
+        let variance = (self.of.squares - self.of.luminance * self.of.luminance / n).max(0.0) / (n * (n - 1.0));
+        Light { color: self.of.color / self.paths as f32, variance: if self.paths > 1 { variance as f32 } else { f32::INFINITY } }
+    }
 }
 
 /// What the centre of a texel sees: where its paths begin.
-struct Centre {
-    texel: u32,
-    hit: Hit,
+pub(super) struct Centre {
+    pub(super) texel: u32,
+    pub(super) hit: Hit,
     stream: u32,
 }
 
@@ -168,11 +186,15 @@ pub fn bake_glossy(
             first.into_iter().zip(rest).map(|(first, rest)| first.and(rest)).collect()
         }
     };
+    let glossy = match &bake.params.denoise {
+        Some(params) => denoised(bake.world, &centres, &sums, probe.map.size, params),
+        None => sums.iter().map(|sums| sums.light().color).collect(),
+    };
     let mut traced = Traced::default();
     let mirrored: Vec<Option<Rgb>> = centres.par_iter().map(|centre| mirrored(bake, probe, centre)).collect();
-    for ((centre, sums), mirrored) in centres.iter().zip(sums).zip(mirrored) {
+    for (((centre, sums), glossy), mirrored) in centres.iter().zip(sums).zip(glossy).zip(mirrored) {
         let texel = &mut probe.texels[centre.texel as usize];
-        texel.set_glossy(sums.of.color / sums.paths as f32);
+        texel.set_glossy(glossy);
         texel.set_mirrored(mirrored.unwrap_or(Rgb::ZERO));
         traced.texels += 1;
         traced.paths += u64::from(sums.paths);

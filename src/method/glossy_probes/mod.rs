@@ -11,6 +11,7 @@ pub mod candidates;
 mod cholesky;
 pub mod coverage;
 pub mod dct;
+mod denoise;
 pub mod filter;
 pub mod footprint;
 pub mod gather;

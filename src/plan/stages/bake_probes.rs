@@ -6,7 +6,7 @@ use crate::gpu::{GpuScene, Paths};
 use crate::io::Provenance;
 use crate::io::jobs::{Done, Shard, complete, is_finished, is_sealed_as, touch};
 use crate::io::provenance::hash_file;
-use crate::lightmap::LightMap;
+use crate::lightmap::{DenoiseParams, LightMap};
 use crate::method::Options;
 use crate::method::glossy_probes::bake::{Bake, PAPER_ROUGHNESS_SCALE, ProbeBakeParams, Traced, bake_glossy, probe_geometry};
 use crate::method::glossy_probes::gather::GatherParams;
@@ -50,6 +50,8 @@ stage! {
         "--error" error: Option<f32>,
         /// Factor on roughness at the first glossy vertex.
         "--roughness-scale" roughness_scale: Option<f32>,
+        /// Take the noise out of the texels.
+        "--denoise" denoise: bool,
         /// Spread a texel's paths over its solid angle.
         "--spread" spread: bool,
         /// Light map to read diffuse light from.
@@ -93,6 +95,7 @@ impl BakeProbes {
             error: self.error,
             roughness_scale: self.roughness_scale.unwrap_or(by_choice),
             spread: self.spread,
+            denoise: self.denoise.then(DenoiseParams::default),
         };
         params.validate()?;
         Ok(params)
