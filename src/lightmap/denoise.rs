@@ -81,6 +81,8 @@ pub struct Surfaces<'a> {
     pub texel: f32,
     /// Radii and weights.
     pub params: &'a DenoiseParams,
+    /// How far each site's light may be shared at most, texels; `None`: as far as the radii say.
+    pub reach: Option<&'a [f32]>,
 }
 
 /// One fit of all sites: how far, how wide, and what light is compared by, if it is.
@@ -145,7 +147,8 @@ impl Surfaces<'_> {
         let mut taps: Vec<(usize, f64, DVec3)> = Vec::with_capacity(walk.found.len());
         for &(j, _) in &walk.found {
             let d = (self.sites[j as usize].position - own.position) * scale;
-            let weight = f64::from(self.weight(i, j as usize, d.length_squared(), pace.by));
+            let narrowed = pace.radius / self.reach(i, j as usize).min(pace.radius);
+            let weight = f64::from(self.weight(i, j as usize, d.length_squared() * narrowed * narrowed, pace.by));
             if weight > 0.0 {
                 let slope = if pace.by.is_some() { (frame.s.dot(d), frame.t.dot(d)) } else { (0.0, 0.0) };
                 let row = DVec3::new(1.0, slope.0.into(), slope.1.into());
@@ -163,6 +166,11 @@ impl Surfaces<'_> {
         }
         // A slope may lead below zero in front of the dark.
         Light { color: color.as_vec3().max(Rgb::ZERO), variance: variance as f32 }
+    }
+
+    /// How far two sites share their light at most, texels.
+    fn reach(&self, i: usize, j: usize) -> f32 {
+        self.reach.map_or(f32::INFINITY, |reach| reach[i].min(reach[j]))
     }
 
     /// What site `j` counts for at `i`; `square`: of their distance, in radii.
@@ -231,7 +239,7 @@ mod tests {
 
     fn denoise(sites: &[Site], see: &(dyn Fn(usize, usize) -> bool + Sync), light: &[Light]) -> Vec<Light> {
         let links = link(sites, TEXEL, see);
-        Surfaces { sites, links: &links, texel: TEXEL, params: &DenoiseParams::default() }.denoise(light, &Silent)
+        Surfaces { sites, links: &links, texel: TEXEL, params: &DenoiseParams::default(), reach: None }.denoise(light, &Silent)
     }
 
     /// Uniform noise of standard deviation 1.
@@ -251,7 +259,7 @@ mod tests {
         };
         let light: Vec<Light> = sites.iter().enumerate().map(light).collect();
         let links = link(&sites, TEXEL, &|_, _| true);
-        let clean = Surfaces { sites: &sites, links: &links, texel: TEXEL, params }.denoise(&light, &Silent);
+        let clean = Surfaces { sites: &sites, links: &links, texel: TEXEL, params, reach: None }.denoise(&light, &Silent);
         let mean = |of: &dyn Fn(usize) -> f32| (0..n * n).map(of).sum::<f32>() / (n * n) as f32;
         (mean(&|i| (clean[i].color.x - truth(&sites[i])).powi(2)), mean(&|i| clean[i].variance))
     }

@@ -26,7 +26,7 @@ impl Plan<'_> {
             Light { color: Rgb::new(r, g, b), variance }
         };
         let light: Vec<Light> = sites.iter().map(light).collect();
-        let surface = Surfaces { sites: &sites, links: &links, texel: self.atlas.texel, params };
+        let surface = Surfaces { sites: &sites, links: &links, texel: self.atlas.texel, params, reach: None };
         for (site, clean) in sites.iter().zip(surface.denoise(&light, progress)) {
             records[site.item as usize][..3].copy_from_slice(&clean.color.to_array().map(f32::to_bits));
         }

@@ -187,7 +187,7 @@ pub fn bake_glossy(
         }
     };
     let glossy = match &bake.params.denoise {
-        Some(params) => denoised(bake.world, &centres, &sums, probe.map.size, params),
+        Some(params) => denoised(bake.world, probe, &centres, &sums, (params, bake.params.roughness_scale)),
         None => sums.iter().map(|sums| sums.light().color).collect(),
     };
     let mut traced = Traced::default();

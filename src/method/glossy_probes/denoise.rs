@@ -2,18 +2,20 @@
 //!
 //! *Ours*: the filter is the light map's ([`crate::lightmap::denoise`]), a fit of first order whose neighbours are weighed by how far they differ beside
 //! the noise that their own paths have measured. Its sites are the probe's texels, at their places in the map, and its links join texels that are next to each
-//! other there and show one smooth surface of one material. What a mirror shows has no noise, and stays as sharp as it is.
+//! other there and show one smooth surface of one material. How far they share light is bounded by how soon their lobes part: where a lobe is narrow, what it
+//! reflects may change from texel to texel, and what a mirror shows stays as sharp as it is.
 //!
 //! In: the hits of texels and the sums over their paths. Out: radiance a texel. A texel's value depends on its probe alone.
 
 use super::bake::{Centre, Sums};
-use crate::base::math::Rgb;
+use crate::base::math::{Rgb, reflect};
 use crate::base::progress::Silent;
 use crate::lightmap::DenoiseParams;
 use crate::lightmap::denoise::{Light, Surfaces};
 use crate::lightmap::links::{Links, Site};
 use crate::lightmap::texels::Point;
 use crate::material::Surface;
+use crate::probe::file::Probe;
 use crate::transport::World;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -23,14 +25,70 @@ const ALIGNED_COS: f32 = 0.9;
 /// Greatest cosine between a normal and the way to a linked texel's point (60 degrees off the plane's normal).
 const RISE_COS: f32 = 0.5;
 
-/// Radiance of the texels of `centres`, in a map of `size`, without most of their noise.
-pub(super) fn denoised(world: &World, centres: &[Centre], sums: &[Sums], size: [u32; 2], params: &DenoiseParams) -> Vec<Rgb> {
+/// How far lobes may part, in units of alpha. *Ours*, by the error of four scenes' probes of 16 paths (docs/experiments.md): some four times the width of the
+/// reflected lobe; nearer texels are told apart by what they show.
+const PART: f32 = 8.0;
+    std::env::var("PART").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0)
+}
+/// Least reach, texels: none.
+const LEAST_REACH: f32 = 1e-3;
+
+/// Radiance of the texels of `centres` without most of their noise; `roughness_scale` as in the bake.
+pub(super) fn denoised(
+    world: &World,
+    probe: &Probe,
+    centres: &[Centre],
+    sums: &[Sums],
+    (params, roughness_scale): (&DenoiseParams, f32),
+) -> Vec<Rgb> {
+    let size = probe.size;
     let seen: Vec<Surface> = centres.par_iter().map(|centre| world.surface(&centre.hit)).collect();
     let sites: Vec<Site> = centres.iter().zip(&seen).map(|(centre, surface)| site(centre, surface, size[0])).collect();
     let links = links(centres, &seen, size);
     let light: Vec<Light> = sums.iter().map(Sums::light).collect();
-    let clean = Surfaces { sites: &sites, links: &links, texel: 1.0, params }.denoise(&light, &Silent);
+    let lobes: Vec<Lobe> = centres
+        .iter()
+        .zip(&seen)
+        .map(|(centre, surface)| Lobe::new(world, probe, centre.texel, surface, roughness_scale))
+        .collect();
+    let reach: Vec<f32> = (0..sites.len()).map(|i| reach(i, &sites, &links, &lobes)).collect();
+    let surfaces = Surfaces { sites: &sites, links: &links, texel: 1.0, params, reach: Some(&reach) };
+    let clean = surfaces.denoise(&light, &Silent);
     clean.into_iter().map(|light| light.color).collect()
+}
+
+/// Where a texel's reflected light comes from.
+struct Lobe {
+    p: Vec3,
+    /// Its axis: where a mirror would look.
+    axis: Vec3,
+    /// How far a mirror would look, m.
+    distance: f32,
+    alpha: f32,
+}
+
+impl Lobe {
+    fn new(world: &World, probe: &Probe, texel: u32, surface: &Surface, roughness_scale: f32) -> Self {
+        let axis = reflect((probe.position - surface.p).normalize_or_zero(), surface.frame.n);
+        let alpha = world.scene.materials[surface.material as usize].bsdf.alpha(surface).unwrap_or(0.0) * roughness_scale;
+        let distance = probe.texels[texel as usize].reflected().distance_from(surface.p);
+        Self { p: surface.p, axis, distance, alpha }
+    }
+
+    /// Angle between what two lobes reflect, as one of them sees it, radians.
+    fn parting(&self, other: &Self) -> f32 {
+        self.axis.distance(other.axis) + self.p.distance(other.p) / self.distance.min(other.distance)
+    }
+}
+
+/// How far a texel may share its light, texels: until lobes have parted.
+fn reach(i: usize, sites: &[Site], links: &Links, lobes: &[Lobe]) -> f32 {
+    let step = |&j: &u32| {
+        let j = j as usize;
+        lobes[i].parting(&lobes[j]) / sites[i].position.distance(sites[j].position)
+    };
+    let largest = links.at(i).iter().map(step).fold(0.0, f32::max);
+    (PART * lobes[i].alpha / largest).max(LEAST_REACH)
 }
 
 /// A texel as a site of a plane: the map itself.
