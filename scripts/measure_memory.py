@@ -3,8 +3,8 @@
 
     python3 scripts/measure_memory.py kitchen/scene_opaque.xml --path scenes/paths/kitchen.json -o work/ --reprobe target/release/reprobe
 
-Peak resident set of the process, as the kernel counts it, and what one stage writes is what the next one reads. Samples are few: they cost time
-and no memory. What grows with a size is told per unit, between the two largest sizes: below, what every stage has, the scene, may be more.
+Peak resident set of the process, as the kernel counts it, and what one stage writes is what the next one reads. Samples are few, to
+save time. What grows with a size is told per unit, between the two largest sizes: below, what every stage has, the scene, may be more.
 """
 
 import argparse
@@ -52,7 +52,7 @@ def stages(scene, path, out):
         (w * w // 2, ["bake-probes", scene, "--probes", few, "--qhmap", o(f"qhmap{w}"), *light, "--spp", 1, "-o", o(f"probes{w}")])
         for w in [256, 512, 1024]
     ]
-    yield "bake-lightfield, 8 probes", "texel of all", [
+    yield "bake-lightfield, 8 probes", "texel", [
         (8 * w * w, ["bake-lightfield", scene, "--probes", few, *size1(w), "--spp", 1, "-o", o(f"lightfield{w}")]) for w in [128, 256, 512]
     ]
     yield "bake-transport", "receiver", [

@@ -11,6 +11,7 @@ use std::path::PathBuf;
 ///
 /// Each probe becomes NNNN.exr: its glossy colour at reduced roughness, the reflector (triangle and barycentrics), and what a
 /// mirror there would show. Finished probes are kept when the command runs again; set.json is written when all are there.
+/// Memory: the scene's, and some 210 bytes a texel of one probe, however many there are.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe bake-probes room/scene.xml --probes probes.json --qhmap qhmap/ -o probes/ --spp 256

@@ -25,11 +25,9 @@ const ALIGNED_COS: f32 = 0.9;
 /// Greatest cosine between a normal and the way to a linked texel's point (60 degrees off the plane's normal).
 const RISE_COS: f32 = 0.5;
 
-/// How far lobes may part, in units of alpha. *Ours*, by the error of four scenes' probes of 16 paths (docs/experiments.md): some four times the width of the
-/// reflected lobe; nearer texels are told apart by what they show.
+/// How far lobes may part, in units of alpha. *Ours*, by the error of four scenes' probes of 16 paths (docs/experiments.md); nearer texels are told apart by what
+/// they show.
 const PART: f32 = 8.0;
-    std::env::var("PART").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0)
-}
 /// Least reach, texels: none.
 const LEAST_REACH: f32 = 1e-3;
 
