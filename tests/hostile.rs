@@ -2,14 +2,13 @@
 //! is tested beside it, and `tests/fuzz.rs` looks for what nobody has thought of.
 #![cfg(unix)]
 
-mod folder;
-
 use flate2::{Compression, Crc, write::ZlibEncoder};
-use folder::{Folder, text};
 use reprobe::io::ExrImage;
 use std::io::Write;
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 
 /// Most memory that the program may map, kilobytes: itself, and what a small file needs.
 const MEMORY: u32 = 1_000_000;
@@ -20,12 +19,28 @@ const CAMERA: &str =
     "<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform>
     <film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>";
 
+struct Folder(TempDir);
+
+impl Folder {
+    fn at(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn add(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.at(name), content).unwrap();
+    }
+
+    fn add_pipe(&self, name: &str) {
+        assert!(Command::new("mkfifo").arg(self.at(name)).status().unwrap().success());
+    }
+}
+
 /// A folder with a room that has `body` in it, and a file.
 fn with(body: &str, file: &str, content: &[u8]) -> Folder {
-    let scene = format!("<scene version='3.0.0'>{CAMERA}<shape type='cube'/>{body}</scene>");
-    let f = Folder::with(&scene, r#"{"fov": 60, "size": [8, 8], "frames": [{"origin": [0, 0, 3], "target": [0, 0, 0]}]}"#);
+    let f = Folder(tempfile::tempdir().unwrap());
+    f.add("scene.xml", format!("<scene version='3.0.0'>{CAMERA}<shape type='cube'/><emitter type='constant'/>{body}</scene>"));
     if !file.is_empty() {
-        std::fs::write(f.at(file), content).unwrap();
+        f.add(file, content);
     }
     f
 }
@@ -36,7 +51,7 @@ fn refused(f: &Folder, args: &str, expected: &str) {
     let start = Instant::now();
     let output =
         Command::new("sh").args(["-c", &bounded, env!("CARGO_BIN_EXE_reprobe")]).current_dir(f.0.path()).output().unwrap();
-    let message = text(&output.stderr);
+    let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{args}: {message}");
     assert!(message.contains(expected), "{args}: {message}\nexpected {expected}");
     assert_eq!(message.lines().count(), 1, "{message}");
@@ -68,7 +83,7 @@ fn names_that_stand_for_names_do_not_grow() {
     let levels: String = (1..40).map(|i| format!("<!ENTITY a{i} '&a{};&a{0};'>", i - 1)).collect();
     let scene = format!("<!DOCTYPE scene [<!ENTITY a0 'ha'>{levels}]><scene version='3.0.0'>{}</scene>", bitmap("&a39;"));
     let f = with("", "", &[]);
-    std::fs::write(f.at("scene.xml"), scene).unwrap();
+    f.add("scene.xml", scene);
     refused(&f, "info scene.xml", "no file \"&a39;\"");
 }
 
@@ -77,14 +92,14 @@ fn devices_and_pipes_are_no_files() {
     refused(&with("", "", &[]), "info /dev/zero --json", "/dev/zero: is a device, expected a file");
     for name in ["/dev/zero", "../../../../../../../../dev/zero", "pipe.png"] {
         let f = with(&bitmap(name), "", &[]);
-        assert!(Command::new("mkfifo").arg(f.at("pipe.png")).status().unwrap().success());
+        f.add_pipe("pipe.png");
         refused(&f, "info scene.xml", &format!("no file \"{name}\""));
         let gltf = format!(r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":4,"uri":"{name}"}}]}}"#);
-        std::fs::write(f.at("scene.gltf"), gltf).unwrap();
+        f.add("scene.gltf", gltf);
         refused(&f, "info scene.gltf", "is no regular file");
     }
     let f = with("", "lights.json", br#"{"objects": [{"type": "mesh", "filename": "pipe.obj", "position": [0, 0, 0]}]}"#);
-    assert!(Command::new("mkfifo").arg(f.at("pipe.obj")).status().unwrap().success());
+    f.add_pipe("pipe.obj");
     refused(&f, "render-path scene.xml --lights lights.json --method path-trace -o out", "is no regular file");
 }
 
@@ -185,7 +200,7 @@ fn images_that_claim_to_be_large() {
         for content in [large, larger] {
             refused(&with(&bitmap(file), file, &content), "info scene.xml", file);
             if file.ends_with(".exr") {
-                refused(&with("", file, &content), &format!("info {file}"), "pixels");
+                refused(&with("", file, &content), &format!("info {file}"), file);
             }
         }
     }

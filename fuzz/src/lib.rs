@@ -154,7 +154,7 @@ fn emitter_holds(scene: &Scene, emitter: &Emitter) {
 fn camera_holds(camera: &Camera) {
     assert!(camera.to_world.is_finite(), "{camera:?}");
     assert!(camera.size.iter().all(|n| (1..=65_536).contains(n)), "{camera:?}");
-    assert!(camera.fov_x > 0.0 && camera.fov_x < std::f32::consts::PI, "{camera:?}");
+    assert!(camera.focal_px().is_normal() && camera.focal_px() > 0.0, "{camera:?}");
     assert!(camera.axis_px().is_finite() && camera.aperture_radius.is_finite(), "{camera:?}");
 }
 

@@ -1,20 +1,19 @@
 //! EXR images of named channels, with provenance.
 
+use super::flat::{self, Flat};
 use super::subsampled::{self, Subsampled};
-use super::{Provenance, atomic, could_hold, primaries, seal};
+use super::{Provenance, atomic, primaries, seal};
 use crate::base::math::Rgb;
 use crate::{Error, Result};
 use exr::prelude as e;
-use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
+use exr::prelude::WritableImage;
 use glam::Mat3;
 use half::f16;
 use std::io::Cursor;
 use std::path::Path;
 
 /// Most pixels that an image may have: untrusted files do not get to allocate more.
-const MAX_PIXELS: usize = 1 << 28;
-/// Bytes of a file that one thread reads.
-const SMALL: usize = 1 << 16;
+pub(super) const MAX_PIXELS: usize = 1 << 28;
 
 /// Samples of one channel, rows from the top.
 #[derive(Debug, Clone, PartialEq)]
@@ -259,47 +258,13 @@ impl ExrImage {
             let to_rec709 = primaries.map(matrix).transpose()?.flatten();
             return Ok(Self { width, height, channels, provenance: None, to_rec709 });
         }
-        let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(bad)?;
-        check_sizes(&meta, bytes.len()).map_err(|m| Error::input(path, m))?;
-        let reader = e::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
-        // Threads of its own cost the crate more than a small file does.
-        let reader = if bytes.len() < SMALL { reader.non_parallel() } else { reader };
-        let image = reader.from_buffered(Cursor::new(bytes)).map_err(bad)?;
-        let layer = image.layer_data;
-        let provenance = provenance(path, &layer.attributes)?;
-        let named = image.attributes.chromaticities.as_ref();
+        let Flat { header, samples } = flat::read(bytes).map_err(bad)?;
+        let provenance = provenance(path, &header.own_attributes)?;
+        let named = header.shared_attributes.chromaticities.as_ref();
         let named = named.map(|c| [c.red, c.green, c.blue, c.white].map(|e::Vec2(x, y)| [x, y]));
         let to_rec709 = named.map(matrix).transpose()?.flatten();
-        let channels = layer
-            .channel_data
-            .list
-            .into_iter()
-            .map(|c| {
-                let samples = match c.sample_data {
-                    e::FlatSamples::F16(v) => Samples::F16(v),
-                    e::FlatSamples::F32(v) => Samples::F32(v),
-                    e::FlatSamples::U32(v) => Samples::U32(v),
-                };
-                (c.name.to_string(), samples)
-            })
-            .collect();
-        Ok(Self { width: layer.size.0, height: layer.size.1, channels, provenance, to_rec709 })
-    }
-}
-
-/// An error where a part has too many pixels, or all of them more than `bytes` could hold.
-fn check_sizes(meta: &exr::meta::MetaData, bytes: usize) -> std::result::Result<(), String> {
-    let mut all = 0u64;
-    for header in &meta.headers {
-        let (size, each) = (header.layer_size, header.channels.bytes_per_pixel as u64);
-        if size.0.saturating_mul(size.1) > MAX_PIXELS {
-            return Err(format!("{} x {} pixels are more than the {MAX_PIXELS} allowed", size.0, size.1));
-        }
-        all = all.saturating_add((size.0 as u64 * size.1 as u64).saturating_mul(each));
-    }
-    match could_hold(bytes, all) {
-        true => Ok(()),
-        false => Err(format!("{bytes} bytes cannot hold {all} bytes of pixels: not a whole image")),
+        let channels = header.channels.list.iter().map(|c| c.name.to_string()).zip(samples).collect();
+        Ok(Self { width: header.layer_size.0, height: header.layer_size.1, channels, provenance, to_rec709 })
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod atomic;
 pub mod canvas;
 pub mod exr;
+mod flat;
 pub mod jobs;
 pub mod json;
 pub mod layer;

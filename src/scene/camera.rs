@@ -3,7 +3,11 @@
 use super::Geometry;
 use crate::base::ray::Ray;
 use glam::{Affine3A, Vec2, Vec3};
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+use std::ops::RangeInclusive;
+
+/// Horizontal fields of view, radians.
+const FOVS: RangeInclusive<f32> = 1e-5..=PI - 1e-4;
 
 /// No clipping.
 pub const ALL_DEPTHS: [f32; 2] = [0.0, f32::INFINITY];
@@ -91,6 +95,13 @@ impl Camera {
     /// The pixel at which the optical axis meets the image.
     pub fn axis_px(&self) -> Vec2 {
         Vec2::new(self.size[0] as f32, self.size[1] as f32) * (self.shift + 0.5)
+    }
+
+    /// Whether single precision tells the rays of its pixels apart: it stands and looks somewhere, and its field of view is neither
+    /// next to nothing nor next to half a turn.
+    pub fn can_see(&self) -> bool {
+        let lens = self.aperture_radius.is_finite() && self.focus_distance.is_finite();
+        self.to_world.is_finite() && FOVS.contains(&self.fov_x) && self.axis_px().is_finite() && lens
     }
 
     /// Where the camera stands.

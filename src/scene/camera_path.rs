@@ -112,7 +112,11 @@ fn camera(
     // A milliradian: nearer than that, the direction of "up" is rounding.
     let up = up.as_vec3().try_normalize().filter(|up| up.cross(z).length() > 1e-3);
     let up: Vec3 = up.ok_or_else(|| format!("up {} is parallel to the view {z}, or zero", frame.up))?;
-    Ok(Camera::look_at(origin_f32, target_f32, up, fov_x, size))
+    let camera = Camera::look_at(origin_f32, target_f32, up, fov_x, size);
+    match camera.can_see() {
+        true => Ok(camera),
+        false => Err(format!("a field of view of {fov_x} radians across is too small or too large")),
+    }
 }
 
 /// Frames at every 1 / fps second from the first keyframe to the last.

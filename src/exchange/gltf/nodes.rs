@@ -136,7 +136,7 @@ fn sensor(camera: &camera::Camera, to_world: &DMat4) -> Option<Camera> {
         let height = (WIDTH as f32 / aspect).round().clamp(1.0, 65_536.0) as u32;
         Camera::pinhole(placed, fov_x, [WIDTH, height])
     };
-    match (&camera.type_, &camera.perspective, &camera.orthographic) {
+    let found = match (&camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(Type::Perspective), Some(lens), _) => {
             let aspect = lens.aspect_ratio.filter(|a| *a > 0.0).unwrap_or(ASPECT);
             let half = (0.5 * lens.yfov).tan() * aspect;
@@ -150,5 +150,6 @@ fn sensor(camera: &camera::Camera, to_world: &DMat4) -> Option<Camera> {
             fits.then(|| Camera { orthographic: Some(Vec2::splat(x * scale)), ..pinhole(x / y, 1.0) })
         }
         _ => None,
-    }
+    };
+    found.filter(Camera::can_see)
 }

@@ -119,6 +119,13 @@ impl<'a> Builder<'a> {
             let near = clip.0 * z;
             camera.clip = [near, near + camera.clip[1] - camera.clip[0]];
         }
+        if !camera.can_see() {
+            return Err(node.at.error(format!(
+                "a sensor of {} radians across at {} sees nothing: its field of view is too small or too large, or it stands nowhere",
+                camera.fov_x,
+                camera.position()
+            )));
+        }
         self.scene.sensor = Some(camera);
         Ok(())
     }
