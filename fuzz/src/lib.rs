@@ -99,7 +99,7 @@ fn scene(name: &str, data: &[u8]) -> bool {
         return false;
     }
     let scene = accepted(name, exchange::decode(Path::new(name), data.to_vec(), &LoadOptions::default()));
-    scene.inspect(|scene| scene_holds(scene)).is_some()
+    scene.inspect(scene_holds).is_some()
 }
 
 fn scene_holds(scene: &Scene) {

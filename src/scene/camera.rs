@@ -3,11 +3,11 @@
 use super::Geometry;
 use crate::base::ray::Ray;
 use glam::{Affine3A, Vec2, Vec3};
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use std::ops::RangeInclusive;
 
 /// Horizontal fields of view, radians.
-const FOVS: RangeInclusive<f32> = 1e-5..=3.1415;
+const FOVS: RangeInclusive<f32> = 1e-5..=PI - 1e-4;
 
 /// No clipping.
 pub const ALL_DEPTHS: [f32; 2] = [0.0, f32::INFINITY];
