@@ -146,19 +146,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
                 elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
             }
             ["property", rest @ ..] => {
-                let scalar = |name: &str| Scalar::named(name).ok_or_else(|| bad("a type such as float or uchar"));
-                let property = match rest {
-                    ["list", length, kind, name] => {
-                        Property { name: (*name).into(), kind: scalar(kind)?, list: Some(scalar(length)?) }
-                    }
-                    [kind, name] => Property { name: (*name).into(), kind: scalar(kind)?, list: None },
-                    _ => return Err(bad("property TYPE NAME or property list TYPE TYPE NAME")),
-                };
+                let property = property(rest).map_err(bad)?;
                 let of = elements.last_mut().ok_or_else(|| bad("an element before its properties"))?;
-                if of.properties.len() == MAX_PARTS {
+                of.properties.push(property);
+                if of.properties.len() > MAX_PARTS {
                     return Err(bad("fewer properties"));
                 }
-                of.properties.push(property);
             }
             ["end_header"] => break,
             _ => return Err(bad("format, comment, element, property or end_header")),
@@ -166,4 +159,14 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     }
     let encoding = encoding.ok_or_else(|| Error::input(path, "the PLY header has no format"))?;
     Ok(Header { encoding, elements, end: at })
+}
+
+/// What a line says after `property`, or what was expected.
+fn property(words: &[&str]) -> std::result::Result<Property, &'static str> {
+    let scalar = |name: &str| Scalar::named(name).ok_or("a type such as float or uchar");
+    Ok(match words {
+        ["list", length, kind, name] => Property { name: (*name).into(), kind: scalar(kind)?, list: Some(scalar(length)?) },
+        [kind, name] => Property { name: (*name).into(), kind: scalar(kind)?, list: None },
+        _ => return Err("property TYPE NAME or property list TYPE TYPE NAME"),
+    })
 }
