@@ -11,20 +11,20 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// The document and the binary chunk of a file.
-fn parts(bytes: &[u8]) -> (Value, Vec<u8>) {
+pub fn parts(bytes: &[u8]) -> (Value, Vec<u8>) {
     let length = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     assert_eq!((&bytes[..4], length(4), length(8)), (&b"glTF"[..], 2, bytes.len()));
     let json = length(12);
     (serde_json::from_slice(&bytes[20..20 + json]).unwrap(), bytes[28 + json..].to_vec())
 }
 
-fn view<'a>(document: &Value, binary: &'a [u8], index: &Value) -> &'a [u8] {
+pub fn view<'a>(document: &Value, binary: &'a [u8], index: &Value) -> &'a [u8] {
     let view = &document["bufferViews"][index.as_u64().unwrap() as usize];
     let [start, length] = ["byteOffset", "byteLength"].map(|name| view[name].as_u64().unwrap() as usize);
     &binary[start..start + length]
 }
 
-fn accessor<T: bytemuck::Pod>(document: &Value, binary: &[u8], index: &Value) -> Vec<T> {
+pub fn accessor<T: bytemuck::Pod>(document: &Value, binary: &[u8], index: &Value) -> Vec<T> {
     let accessor = &document["accessors"][index.as_u64().unwrap() as usize];
     bytemuck::pod_collect_to_vec(view(document, binary, &accessor["bufferView"]))
 }
