@@ -146,17 +146,17 @@ impl Page {
 
 /// Whether a shape has second coordinates of its own; an error says why they are no layout.
 fn is_laid_out(geometry: &Geometry, object: usize) -> Result<bool, &'static str> {
-    let triangles = geometry.objects[object].triangles.clone();
-    let corners: Vec<_> = triangles.clone().map(|t| geometry.light_corners(t)).collect();
-    if corners.iter().all(Option::is_none) {
+    let of = &geometry.objects[object];
+    if !of.vertices.clone().any(|v| geometry.light_uvs.get(v as usize).is_some_and(|uv| uv.is_finite())) {
         return Ok(false);
     }
-    let corners = corners.into_iter().collect::<Option<Vec<_>>>().ok_or("are not all finite")?;
+    let corners: Option<Vec<_>> = of.triangles.clone().map(|t| geometry.light_corners(t)).collect();
+    let corners = corners.ok_or("are not all finite")?;
     let is_inside = |p: &Vec2| p.cmpge(Vec2::splat(-SLACK)).all() && p.cmple(Vec2::splat(1.0 + SLACK)).all();
     if !corners.iter().flatten().all(is_inside) {
         return Err("lie outside of [0, 1]");
     }
-    let surfaces: Vec<f64> = triangles.map(|t| 0.5 * f64::from(geometry.area_normal(t).length())).collect();
+    let surfaces: Vec<f64> = of.triangles.clone().map(|t| 0.5 * f64::from(geometry.area_normal(t).length())).collect();
     let (surface, covered): (f64, f64) = (surfaces.iter().sum(), corners.iter().map(area).sum());
     // Texels a square metre, relative to those of all.
     let is_flat = |(corners, of): &(&[Vec2; 3], &f64)| area(corners) * surface < FLATTENED * covered * **of;
