@@ -254,3 +254,26 @@ fn textures_and_their_places_come_back() {
         assert!((a * factor).distance(b) < 0.01, "{i}: {a} {b}");
     }
 }
+
+#[test]
+fn what_the_light_map_does_not_have_is_written_without() {
+    let folder = tempfile::tempdir().unwrap();
+    let before = scene(
+        folder.path(),
+        r#"<shape type="rectangle"/><shape type="cube"><bsdf type="dielectric"/></shape><shape type="cube"><bsdf type="conductor"/></shape>
+           <emitter type="constant"/>"#,
+    );
+    let params = AtlasParams { texel: Some(0.25), ..AtlasParams::default() };
+    let atlas = Atlas::build(&before.geometry, &|object| object == 0, &params).unwrap();
+    let count = (atlas.size[0] * atlas.size[1]) as usize;
+    let map = lookup::sides(&before.geometry, &atlas, vec![Vec3::ONE; count], None);
+    let (after, document, _) = written(&before, Some(&map), folder.path());
+    assert_eq!(after.geometry.triangles.len(), before.geometry.triangles.len());
+    for i in 0..3 {
+        let node = &document["nodes"][i];
+        let primitive = &document["meshes"][node["mesh"].as_u64().unwrap() as usize]["primitives"][0];
+        let material = &document["materials"][primitive["material"].as_u64().unwrap() as usize];
+        let found = [&node["extensions"]["MX_lightmap"], &material["occlusionTexture"], &primitive["attributes"]["TEXCOORD_1"]];
+        assert!(found.iter().all(|value| value.is_null() == (i > 0)), "{i}: {found:?}");
+    }
+}

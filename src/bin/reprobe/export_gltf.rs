@@ -18,7 +18,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// Scene: Mitsuba XML or JSON, or glTF
     scene: PathBuf,
-    /// Its light map, from bake-lightmap; transmissive shapes are left out then, as in the map
+    /// Its light map, from bake-lightmap; what is not in it (glass, mirrors) is written without
     #[arg(long, value_name = "FILE.exr")]
     lightmap: Option<PathBuf>,
     /// Its ambient occlusion, from bake-lightmap --ao, for the occlusion texture

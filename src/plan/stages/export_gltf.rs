@@ -41,13 +41,7 @@ impl ExportGltf {
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
         let clock = seconds();
-        // What a light map was baked for has no transmissive shapes.
-        let is_baked = self.lightmap.is_some() || self.ao.is_some();
-        let world = is_baked.then(|| cx.opaque_world(&self.scene)).transpose()?;
-        let loaded = if world.is_none() { Some(cx.load_scene(&self.scene)?) } else { None };
-        let Some(scene) = world.as_ref().map(|w| &w.scene).or(loaded.as_ref()) else {
-            return Err(Error::input(&self.scene, "no scene was read"));
-        };
+        let scene = &cx.load_scene(&self.scene)?;
         let map = self.lightmap.as_ref().map(|path| LightMap::load(path, scene)).transpose()?;
         let openness = self.ao.as_ref().map(|path| LightMap::load_openness(path, scene)).transpose()?;
         if let (Some(light), Some(open), Some(path)) = (&map, &openness, &self.ao)
