@@ -12,6 +12,9 @@ pub struct Geometry {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, one a vertex; zero where the file has none.
     pub uvs: Vec<Vec2>,
+    /// Second texture coordinates, as a file has them for light maps, which nothing but an export reads: [`Self::light_corners`]. One a vertex,
+    /// NaN for vertices without; those past the end have none either.
+    pub light_uvs: Vec<Vec2>,
     /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
     /// The object that each triangle belongs to.
@@ -48,6 +51,22 @@ impl Geometry {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize])
     }
 
+    /// Second texture coordinates of a triangle's corners, where it has any.
+    pub fn light_corners(&self, triangle: u32) -> Option<[Vec2; 3]> {
+        let [a, b, c] = self.triangles[triangle as usize].map(|i| self.light_uvs.get(i as usize).filter(|uv| uv.is_finite()));
+        Some([*a?, *b?, *c?])
+    }
+
+    /// Gives second texture coordinates to the last vertices, as many as there are of them.
+    pub fn set_last_light_uvs(&mut self, light_uvs: Vec<Vec2>) {
+        if let Some(before) = self.positions.len().checked_sub(light_uvs.len())
+            && !light_uvs.is_empty()
+        {
+            self.light_uvs.resize(before, Vec2::NAN);
+            self.light_uvs.extend(light_uvs);
+        }
+    }
+
     /// The object of a triangle.
     pub fn object(&self, triangle: u32) -> &Object {
         &self.objects[self.triangle_object[triangle as usize] as usize]
@@ -72,6 +91,7 @@ impl Geometry {
             positions: copy(&self.positions, vertices),
             normals: copy(&self.normals, vertices),
             uvs: copy(&self.uvs, vertices),
+            light_uvs: self.light_uvs.clone(),
             triangles: copy(&self.triangles, triangles),
             triangle_object: copy(&self.triangle_object, triangles),
             objects: self.objects.clone(),

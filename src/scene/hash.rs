@@ -1,6 +1,6 @@
 //! What a scene is, in one hash: its triangles, materials and emitters as they were built, whatever file they came from.
 //!
-//! Names, cameras, films and integrators stay out of it: a moved camera spoils no bake. Triangles, materials and emitters are numbered in the
+//! Names, cameras, films, integrators and light maps' texture coordinates stay out of it: a moved camera spoils no bake. Triangles, materials and emitters are numbered in the
 //! order of the file, so their order counts.
 
 use super::Scene;
@@ -40,7 +40,7 @@ mod tests {
     use crate::material::{Material, Texture};
     use crate::scene::mesh::append;
     use crate::scene::{Camera, Emitter, primitives};
-    use glam::{Affine2, Mat4, Vec3};
+    use glam::{Affine2, Mat4, Vec2, Vec3};
     use std::sync::Arc;
 
     fn scene(pixel: f32) -> Scene {
@@ -68,6 +68,7 @@ mod tests {
             hash(&|s| s.geometry_mut().objects[0].name = "other".into()),
             hash(&|s| s.sensor = Some(Camera::look_at(Vec3::ZERO, Vec3::Z, Vec3::Y, 1.0, [4, 4]))),
             hash(&|s| s.path = "elsewhere.xml".into()),
+            hash(&|s| s.geometry_mut().set_last_light_uvs(vec![Vec2::ONE; 24])),
         ] {
             assert_eq!(alike, same);
         }

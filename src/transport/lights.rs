@@ -383,6 +383,7 @@ mod tests {
             positions: vec![corner(-1.0, -2.0), corner(1.0, -2.0), corner(1.0, 2.0), corner(-1.0, 2.0)],
             normals: vec![Vec3::NEG_Y; 4],
             uvs: vec![Vec2::ZERO; 4],
+            light_uvs: Vec::new(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             triangle_object: vec![0, 0],
             objects: vec![Object {

@@ -11,20 +11,20 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// The document and the binary chunk of a file.
-fn parts(bytes: &[u8]) -> (Value, Vec<u8>) {
+pub fn parts(bytes: &[u8]) -> (Value, Vec<u8>) {
     let length = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     assert_eq!((&bytes[..4], length(4), length(8)), (&b"glTF"[..], 2, bytes.len()));
     let json = length(12);
     (serde_json::from_slice(&bytes[20..20 + json]).unwrap(), bytes[28 + json..].to_vec())
 }
 
-fn view<'a>(document: &Value, binary: &'a [u8], index: &Value) -> &'a [u8] {
+pub fn view<'a>(document: &Value, binary: &'a [u8], index: &Value) -> &'a [u8] {
     let view = &document["bufferViews"][index.as_u64().unwrap() as usize];
     let [start, length] = ["byteOffset", "byteLength"].map(|name| view[name].as_u64().unwrap() as usize);
     &binary[start..start + length]
 }
 
-fn accessor<T: bytemuck::Pod>(document: &Value, binary: &[u8], index: &Value) -> Vec<T> {
+pub fn accessor<T: bytemuck::Pod>(document: &Value, binary: &[u8], index: &Value) -> Vec<T> {
     let accessor = &document["accessors"][index.as_u64().unwrap() as usize];
     bytemuck::pod_collect_to_vec(view(document, binary, &accessor["bufferView"]))
 }
@@ -252,5 +252,28 @@ fn textures_and_their_places_come_back() {
     for i in 2..40 {
         let (a, b) = (value(&a, i), value(&b, i));
         assert!((a * factor).distance(b) < 0.01, "{i}: {a} {b}");
+    }
+}
+
+#[test]
+fn what_the_light_map_does_not_have_is_written_without() {
+    let folder = tempfile::tempdir().unwrap();
+    let before = scene(
+        folder.path(),
+        r#"<shape type="rectangle"/><shape type="cube"><bsdf type="dielectric"/></shape><shape type="cube"><bsdf type="conductor"/></shape>
+           <emitter type="constant"/>"#,
+    );
+    let params = AtlasParams { texel: Some(0.25), ..AtlasParams::default() };
+    let atlas = Atlas::build(&before.geometry, &|object| object == 0, &params).unwrap();
+    let count = (atlas.size[0] * atlas.size[1]) as usize;
+    let map = lookup::sides(&before.geometry, &atlas, vec![Vec3::ONE; count], None);
+    let (after, document, _) = written(&before, Some(&map), folder.path());
+    assert_eq!(after.geometry.triangles.len(), before.geometry.triangles.len());
+    for i in 0..3 {
+        let node = &document["nodes"][i];
+        let primitive = &document["meshes"][node["mesh"].as_u64().unwrap() as usize]["primitives"][0];
+        let material = &document["materials"][primitive["material"].as_u64().unwrap() as usize];
+        let found = [&node["extensions"]["MX_lightmap"], &material["occlusionTexture"], &primitive["attributes"]["TEXCOORD_1"]];
+        assert!(found.iter().all(|value| value.is_null() == (i > 0)), "{i}: {found:?}");
     }
 }

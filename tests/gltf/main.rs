@@ -2,6 +2,7 @@
 
 mod export;
 mod hostile;
+mod second_set;
 mod writer;
 
 use glam::{Vec2, Vec3};

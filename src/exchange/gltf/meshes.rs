@@ -12,11 +12,17 @@ use gltf_json::skin::Skin;
 use gltf_json::validation::Checked;
 use gltf_json::{Index, Root};
 
-/// A primitive's triangles and the colours of its vertices.
+/// A primitive's triangles, and what of its vertices not every mesh has.
+#[derive(Default)]
 pub struct Part {
     pub mesh: Mesh,
     pub colors: Vec<Rgb>,
+    /// Texture coordinates for light maps.
+    pub light_uvs: Vec<Vec2>,
 }
+
+/// The texture coordinates that programs lay out for light maps.
+const LIGHT_SET: u32 = 1;
 
 /// Reads a primitive with the texture coordinates of `set`; `None` where it has no triangles. `weights` are its morph targets'.
 pub fn part(file: &File, primitive: &Primitive, set: u32, weights: &[f32]) -> Result<Option<Part>> {
@@ -32,24 +38,32 @@ pub fn part(file: &File, primitive: &Primitive, set: u32, weights: &[f32]) -> Re
         move_by(file, target.positions, &mut positions, weight)?;
         move_by(file, target.normals, &mut normals, weight)?;
     }
-    let uvs = match attribute(Semantic::TexCoords(set)) {
-        Some(uvs) => file.numbers::<2>(uvs, "texture coordinates")?.into_iter().map(Vec2::from).collect(),
-        None => Vec::new(),
+    let coordinates = |set: u32| -> Result<Vec<Vec2>> {
+        let Some(uvs) = attribute(Semantic::TexCoords(set)) else { return Ok(Vec::new()) };
+        Ok(file.numbers::<2>(uvs, "texture coordinates")?.into_iter().map(Vec2::from).collect())
     };
+    let uvs = coordinates(set)?;
+    let light_uvs = if set == LIGHT_SET { Vec::new() } else { coordinates(LIGHT_SET)? };
     let colors = attribute(Semantic::Colors(0)).map(|colors| self::colors(file, colors)).transpose()?.unwrap_or_default();
     let corners = match primitive.indices {
         Some(indices) => file.indices(indices, "indices")?,
         None => (0..positions.len() as u32).collect(),
     };
     let Some(triangles) = triangles(&primitive.mode, &corners) else { return Ok(None) };
-    for (what, count) in [("normals", normals.len()), ("texture coordinates", uvs.len()), ("colours", colors.len())] {
+    let counts = [
+        ("normals", normals.len()),
+        ("texture coordinates", uvs.len()),
+        ("second texture coordinates", light_uvs.len()),
+        ("colours", colors.len()),
+    ];
+    for (what, count) in counts {
         if count != 0 && count != positions.len() {
             return Err(file.error(format!("a primitive has {count} {what} of {} vertices", positions.len())));
         }
     }
     let mesh = Mesh { positions, normals, uvs, triangles };
     mesh::check(&mesh).map_err(|e| file.error(e))?;
-    Ok((!mesh.triangles.is_empty()).then_some(Part { mesh, colors }))
+    Ok((!mesh.triangles.is_empty()).then_some(Part { mesh, colors, light_uvs }))
 }
 
 /// How many vertices a primitive says that it has, nothing of it read.
@@ -144,8 +158,7 @@ pub fn by_handedness(part: Part) -> [Part; 2] {
     };
     let (mirrored, upright): (Vec<_>, Vec<_>) = mesh.triangles.iter().partition(|t| is_mirrored(t));
     if mirrored.is_empty() || upright.is_empty() {
-        let empty = Part { mesh: Mesh::default(), colors: Vec::new() };
-        return if mirrored.is_empty() { [part, empty] } else { [empty, part] };
+        return if mirrored.is_empty() { [part, Part::default()] } else { [Part::default(), part] };
     }
     [upright, mirrored].map(|triangles| some_of(&part, &triangles))
 }
@@ -166,5 +179,5 @@ fn some_of(part: &Part, triangles: &[[u32; 3]]) -> Part {
         uvs: of(uvs, &kept),
         triangles: triangles.iter().map(|t| t.map(|i| number[i as usize])).collect(),
     };
-    Part { mesh, colors: of(&part.colors, &kept) }
+    Part { mesh, colors: of(&part.colors, &kept), light_uvs: of(&part.light_uvs, &kept) }
 }

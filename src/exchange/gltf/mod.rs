@@ -155,7 +155,7 @@ impl Builder<'_> {
     }
 
     fn append(&mut self, part: Part, to_world: DMat4, name: String, (look, mirrored): (usize, bool)) -> Result<()> {
-        let Part { mesh, colors } = part;
+        let Part { mesh, colors, light_uvs } = part;
         let geometry = &self.scene.geometry;
         if mesh.triangles.is_empty() {
             return Ok(());
@@ -186,7 +186,9 @@ impl Builder<'_> {
         // Without normals faces are flat, and a mirroring transform turns their winding round.
         let flat = mesh.normals.is_empty();
         let flip = flat && to_world.determinant() < 0.0;
-        append(self.scene.geometry_mut(), mesh, to_world, flip, flat, name, material, emitter);
+        let geometry = self.scene.geometry_mut();
+        append(geometry, mesh, to_world, flip, flat, name, material, emitter);
+        geometry.set_last_light_uvs(light_uvs);
         Ok(())
     }
 

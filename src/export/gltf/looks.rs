@@ -1,6 +1,6 @@
 //! Scattering models as metallic-roughness: exact for `principled` and diffuse surfaces, near for plastics and metals.
 
-use super::pixels;
+use super::pixels::{self, Picture};
 use super::writer::Writer;
 use crate::Result;
 use crate::base::math::{Basis, Rgb};
@@ -31,13 +31,13 @@ struct Look {
     normals: Option<Texture>,
 }
 
-/// Writes a material of the scene with the light of an emitter, to be seen from both sides or from one; returns its number.
+/// A material of the scene with the light of an emitter, to be seen from both sides or from one. Its textures are written, it is not.
 pub fn material(
     writer: &mut Writer,
     scene: &Scene,
     (material, emitter, both_sides): (u32, Option<u32>, bool),
     warnings: &mut Vec<String>,
-) -> Result<usize> {
+) -> Result<Value> {
     let material = &scene.materials[material as usize];
     let radiance = match emitter.and_then(|e| scene.emitters.get(e as usize)) {
         Some(Emitter::Area { radiance, .. }) => Some(radiance),
@@ -59,7 +59,7 @@ pub fn material(
         json["alphaMode"] = json!("BLEND");
     }
     if let Some(Texture::Bitmap(bitmap)) = &look.normals {
-        json["normalTexture"] = info(writer, bitmap, pixels::linear(&bitmap.image)?);
+        json["normalTexture"] = info(writer, bitmap, &pixels::linear(&bitmap.image))?;
     }
     let mut extensions = Map::new();
     match look.ior {
@@ -80,7 +80,7 @@ pub fn material(
     if !extensions.is_empty() {
         json["extensions"] = Value::Object(extensions);
     }
-    Ok(writer.push("materials", json))
+    Ok(json)
 }
 
 fn add(writer: &mut Writer, extensions: &mut Map<String, Value>, name: &'static str, content: Value) {
@@ -223,14 +223,14 @@ fn base(writer: &mut Writer, look: &Look, coverage: Option<&Texture>) -> Result<
     let alpha = covering.map(|b| b.image.map(|x| x * b.scale));
     Ok(match (as_bitmap(&look.base), covering) {
         (Some(bitmap), _) => {
-            let png = pixels::color(&bitmap.image, alpha.as_ref())?;
-            (color(look.tint * bitmap.scale, constant), Some(info(writer, &bitmap, png)))
+            let picture = pixels::color(&bitmap.image, alpha.as_ref());
+            (color(look.tint * bitmap.scale, constant), Some(info(writer, &bitmap, &picture)?))
         }
         (None, Some(bitmap)) => {
             let Image { width, height, .. } = *bitmap.image;
             let white = Image::new(width, height, vec![Rgb::ONE; width * height]);
-            let png = pixels::color(&white, alpha.as_ref())?;
-            (color(look.base.mean() * look.tint, constant), Some(info(writer, bitmap, png)))
+            let picture = pixels::color(&white, alpha.as_ref());
+            (color(look.base.mean() * look.tint, constant), Some(info(writer, bitmap, &picture)?))
         }
         (None, None) => (color(look.base.mean() * look.tint, constant), None),
     })
@@ -261,8 +261,8 @@ fn rough_metal(writer: &mut Writer, look: &Look, pbr: &mut Map<String, Value>) -
                 Texture::Bitmap(b) => b.image.map(|x| x * b.scale),
                 other => Image::new(1, 1, vec![other.mean()]),
             };
-            let png = pixels::roughness_metalness(&image(&look.roughness), &image(&look.metalness))?;
-            pbr.insert("metallicRoughnessTexture".into(), info(writer, bitmap, png));
+            let picture = pixels::roughness_metalness(&image(&look.roughness), &image(&look.metalness));
+            pbr.insert("metallicRoughnessTexture".into(), info(writer, bitmap, &picture)?);
             [1.0, 1.0]
         }
     };
@@ -285,9 +285,9 @@ fn emission(writer: &mut Writer, radiance: &Texture, json: &mut Value, extension
     let strength = largest.max(1.0);
     match bitmap {
         Some(b) => {
-            let png = pixels::color(&b.image.map(|x| x * b.scale / strength), None)?;
+            let picture = pixels::color(&b.image.map(|x| x * b.scale / strength), None);
             json["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
-            json["emissiveTexture"] = info(writer, &b, png);
+            json["emissiveTexture"] = info(writer, &b, &picture)?;
         }
         None => json["emissiveFactor"] = json!((radiance.mean() / strength).max(Rgb::ZERO).to_array()),
     }
@@ -298,7 +298,7 @@ fn emission(writer: &mut Writer, radiance: &Texture, json: &mut Value, extension
 }
 
 /// A texture's entry of a material.
-fn info(writer: &mut Writer, bitmap: &Bitmap, png: Vec<u8>) -> Value {
+fn info(writer: &mut Writer, bitmap: &Bitmap, picture: &Picture) -> Result<Value> {
     let (filter, wrap) = (
         if bitmap.nearest { 9728 } else { 9729 },
         match bitmap.wrap {
@@ -309,7 +309,7 @@ fn info(writer: &mut Writer, bitmap: &Bitmap, png: Vec<u8>) -> Value {
     );
     let sampler =
         json!({ "magFilter": filter, "minFilter": if bitmap.nearest { 9728 } else { 9987 }, "wrapS": wrap, "wrapT": wrap });
-    let index = writer.texture(&png, "", sampler);
+    let index = writer.texture(picture, "", sampler)?;
     let mut info = json!({ "index": index });
     if bitmap.to_uv != Affine2::IDENTITY {
         writer.uses("KHR_texture_transform");
@@ -317,5 +317,5 @@ fn info(writer: &mut Writer, bitmap: &Bitmap, png: Vec<u8>) -> Value {
         info["extensions"] =
             json!({ "KHR_texture_transform": { "offset": offset.to_array(), "rotation": -angle, "scale": scale.to_array() } });
     }
-    info
+    Ok(info)
 }

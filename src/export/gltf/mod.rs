@@ -1,27 +1,32 @@
 //! glTF 2.0 as one binary file: a scene with its light map on the second texture coordinates.
 //!
+//! Those are the ones that the scene came with where they are laid out for a light map (`layout`), else places in the map's atlas.
+//!
 //! No ratified extension has light maps. `MX_lightmap` (of nodes, RGBM) is the one here, with ambient occlusion, or else the map's relative luminance, as
 //! occlusion for viewers that do not know it.
 
+mod layout;
+mod light;
 mod looks;
 mod pixels;
+mod points;
 mod shapes;
 mod writer;
 
-use crate::base::math::{Rgb, luminance};
+use crate::base::math::Rgb;
 use crate::io::Provenance;
 use crate::lightmap::LightMap;
 use crate::scene::{Camera, Emitter, Scene};
 use crate::{Error, Result};
 use glam::{Affine3A, DMat3, DMat4, DQuat, Mat4, Quat, Vec3};
+use layout::{Layout, Place};
+use light::Light;
 use serde_json::{Map, Value, json};
+use shapes::Second;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 use writer::Writer;
-
-/// Share of the map's texels that are as bright as occlusion's white, or brighter.
-const BRIGHT: f32 = 0.05;
 
 /// Where a GLB file's JSON starts, and how ours does.
 const JSON_AT: usize = 20;
@@ -37,6 +42,10 @@ pub struct Exported {
     pub materials: usize,
     /// Triangles whose backs are lit: they are in it twice, once for each side.
     pub behind: usize,
+    /// Shapes whose light lies on the second texture coordinates that they came with.
+    pub kept: usize,
+    /// Textures of light that those share.
+    pub pages: usize,
 }
 
 /// What was baked for a scene, on one layout of texels.
@@ -48,48 +57,89 @@ pub struct Bakes<'a> {
     pub openness: Option<&'a LightMap>,
 }
 
-/// Writes a scene, and what was baked for it.
-pub fn glb(scene: &Scene, bakes: Bakes, provenance: &Value) -> Result<Exported> {
-    let mut warnings = Vec::new();
-    let mut writer = Writer::default();
-    let (lightmap, layout) = (bakes.light, bakes.light.or(bakes.openness));
-    let light = lightmap.map(|map| Light::write(&mut writer, map)).transpose()?;
-    let (mut materials, mut roots, mut behind) = (BTreeMap::new(), Vec::new(), 0);
-    for (object, of) in scene.geometry.objects.iter().enumerate() {
-        let bsdf = &scene.materials[of.material as usize].bsdf;
-        let backs = match lightmap {
-            Some(map) if bsdf.is_two_sided() => shapes::lit_behind(&scene.geometry, object, map),
-            _ => Vec::new(),
-        };
-        behind += backs.len();
-        // A texel lights both sides of what it lies on: where each has its own, each is a shape that is seen from before alone.
-        let both_sides = bsdf.is_two_sided() && backs.is_empty();
-        let key = (of.material, of.emitter, both_sides);
-        let material = match materials.get(&key) {
-            Some(material) => *material,
+impl<'a> Bakes<'a> {
+    /// Either of them, for where its texels lie.
+    fn any(&self) -> Option<&'a LightMap> {
+        self.light.or(self.openness)
+    }
+}
+
+/// What tells materials apart: the scene's, the emitter, whether both sides are seen.
+type Kind = (u32, Option<u32>, bool);
+
+/// Materials that were written, one a kind and place of its light, whose occlusion is theirs.
+#[derive(Default)]
+struct Materials {
+    looks: BTreeMap<Kind, Value>,
+    numbers: BTreeMap<(Kind, Place), usize>,
+}
+
+impl Materials {
+    /// The number of one, which is written where it is not there yet.
+    fn number(
+        &mut self,
+        writer: &mut Writer,
+        scene: &Scene,
+        (kind, place): (Kind, Place),
+        light: &Light,
+        warnings: &mut Vec<String>,
+    ) -> Result<usize> {
+        if let Some(number) = self.numbers.get(&(kind, place)) {
+            return Ok(*number);
+        }
+        let mut json = match self.looks.get(&kind) {
+            Some(json) => json.clone(),
             None => {
-                let written = looks::material(&mut writer, scene, key, &mut warnings)?;
-                materials.insert(key, written);
-                written
+                let json = looks::material(writer, scene, kind, warnings)?;
+                self.looks.insert(kind, json.clone());
+                json
             }
         };
-        for (triangles, is_back) in [(of.triangles.clone().collect(), false), (backs, true)] {
+        if let Some(occlusion) = light.occlusion(place) {
+            json["occlusionTexture"] = occlusion;
+        }
+        let number = writer.push("materials", json);
+        self.numbers.insert((kind, place), number);
+        Ok(number)
+    }
+}
+
+/// Writes a scene, and what was baked for it.
+pub fn glb(scene: &Scene, bakes: Bakes, provenance: &Value) -> Result<Exported> {
+    let (mut warnings, mut writer) = (Vec::new(), Writer::default());
+    let geometry = &scene.geometry;
+    let is_two_sided = |object: usize| scene.materials[geometry.objects[object].material as usize].bsdf.is_two_sided();
+    let behind = |object: usize| match bakes.light {
+        Some(map) if is_two_sided(object) => shapes::lit_behind(geometry, object, map),
+        _ => Vec::new(),
+    };
+    let backs: Vec<Vec<u32>> = (0..geometry.objects.len()).map(behind).collect();
+    let layout = Layout::of(geometry, bakes.any(), &mut warnings);
+    let light = Light::write(&mut writer, geometry, bakes, &layout, &backs)?;
+    let (mut materials, mut roots) = (Materials::default(), Vec::new());
+    for (object, of) in geometry.objects.iter().enumerate() {
+        let (place, backs) = (layout.places[object], &backs[object]);
+        let second = match (place, bakes.any()) {
+            (Place::Atlas, Some(map)) => Second::Map(map),
+            _ if of.triangles.clone().all(|t| geometry.light_corners(t).is_some()) => Second::Own,
+            _ => Second::None,
+        };
+        // A texel lights both sides of what it lies on: where each has its own, each is a shape that is seen from before alone.
+        let kind = (of.material, of.emitter, is_two_sided(object) && backs.is_empty());
+        let material = materials.number(&mut writer, scene, (kind, place), &light, &mut warnings)?;
+        let fronts: Vec<u32> = of.triangles.clone().collect();
+        for (triangles, is_back) in [(&fronts, false), (backs, true)] {
             if triangles.is_empty() {
                 continue;
             }
-            let shape = shapes::shape(&scene.geometry, object, &triangles, layout, is_back);
+            let shape = shapes::shape(geometry, object, triangles, second, is_back);
             let mut node = json!({ "mesh": shape.write(&mut writer, &of.name, material), "name": of.name });
-            if let Some(light) = &light {
-                node["extensions"] = json!({ "MX_lightmap": light.of(is_back) });
+            if let Some(light) = light.of(place, is_back) {
+                node["extensions"] = json!({ "MX_lightmap": light });
+                writer.uses("MX_lightmap");
             }
             roots.push(writer.push("nodes", node));
         }
-    }
-    if light.is_some() {
-        writer.uses("MX_lightmap");
-    }
-    if let Some(occlusion) = occlusion(&mut writer, bakes)? {
-        writer.occlude(occlusion);
     }
     let lights = lights(&mut writer, &scene.emitters, &mut roots, &mut warnings);
     if let Some(camera) = &scene.sensor {
@@ -97,14 +147,16 @@ pub fn glb(scene: &Scene, bakes: Bakes, provenance: &Value) -> Result<Exported> 
     }
     warnings.sort();
     warnings.dedup();
-    let count = materials.len();
+    let (count, behind) = (materials.numbers.len(), backs.iter().map(Vec::len).sum());
+    let kept = layout.places.iter().filter(|place| matches!(place, Place::Page(_))).count();
     writer.push("scenes", json!({ "nodes": roots }));
     let asset = json!({ "generator": concat!("reprobe ", env!("CARGO_PKG_VERSION")), "version": "2.0", "extras": { "provenance": provenance } });
     let mut extensions = Map::new();
     if !lights.is_empty() {
         extensions.insert("KHR_lights_punctual".into(), json!({ "lights": lights }));
     }
-    Ok(Exported { bytes: writer.finish(asset, Value::Object(extensions))?, warnings, materials: count, behind })
+    let bytes = writer.finish(asset, Value::Object(extensions))?;
+    Ok(Exported { bytes, warnings, materials: count, behind, kept, pages: layout.pages.len() })
 }
 
 /// Whether a file that begins like this was written by [`glb`].
@@ -129,56 +181,6 @@ pub fn read_provenance(path: &Path) -> Result<Option<Provenance>> {
     let document: Value = serde_json::from_slice(&text).map_err(|e| bad(e.to_string()))?;
     let found = &document["asset"]["extras"]["provenance"];
     serde_json::from_value(found.clone()).map_err(|e| bad(format!("asset.extras.provenance: {e}")))
-}
-
-/// The textures of a light map.
-struct Light {
-    front: usize,
-    back: Option<usize>,
-    intensity: f32,
-}
-
-/// Of a texture whose charts must not mix with what lies beyond its edges.
-fn sampler() -> Value {
-    json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 })
-}
-
-/// Writes the texture of occlusion, of what says most of it.
-fn occlusion(writer: &mut Writer, bakes: Bakes) -> Result<Option<usize>> {
-    let (map, white, name) = match bakes {
-        Bakes { openness: Some(map), .. } => (map, 1.0, "ambient occlusion"),
-        Bakes { light: Some(map), .. } => {
-            let mut bright: Vec<f32> = map.front.iter().map(|p| luminance(*p)).filter(|l| *l > 0.0).collect();
-            bright.sort_unstable_by(f32::total_cmp);
-            let white = bright.get((bright.len() as f32 * (1.0 - BRIGHT)) as usize).copied().unwrap_or(1.0);
-            (map, white, "relative irradiance")
-        }
-        _ => return Ok(None),
-    };
-    let size = map.size.map(|n| n as usize);
-    let shares: Vec<f32> = map.front.iter().take(size[0] * size[1]).map(|p| luminance(*p) / white).collect();
-    Ok(Some(writer.texture(&pixels::occlusion(&shares, size)?, name, sampler())))
-}
-
-impl Light {
-    fn write(writer: &mut Writer, map: &LightMap) -> Result<Self> {
-        let size = map.size.map(|n| n as usize);
-        let all = || map.front.iter().chain(map.back.iter().flatten());
-        let largest = all().map(|p| p.max_element()).fold(0.0, f32::max);
-        let intensity = (largest / pixels::RGBM_RANGE).max(1.0);
-        let mut texture = |pixels: &[Rgb], name: &str| -> Result<usize> {
-            let picture: Vec<Rgb> = pixels.iter().take(size[0] * size[1]).map(|p| *p / intensity).collect();
-            Ok(writer.texture(&pixels::rgbm(&picture, size)?, name, sampler()))
-        };
-        let front = texture(&map.front, "irradiance")?;
-        let back = map.back.as_ref().map(|back| texture(back, "irradiance of backs")).transpose()?;
-        Ok(Self { front, back, intensity })
-    }
-
-    fn of(&self, turned: bool) -> Value {
-        let index = self.back.filter(|_| turned).unwrap_or(self.front);
-        json!({ "lightMapTexture": { "index": index, "texCoord": 1 }, "intensity": self.intensity })
-    }
 }
 
 /// Writes the nodes of the lights that have a place; returns the lights.

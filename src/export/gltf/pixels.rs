@@ -1,9 +1,9 @@
-//! Images as PNG files.
+//! Pictures of 8-bit pixels, and PNG files of them.
 
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::io::picture::{byte, srgb};
-use crate::io::png::encoded as png;
+use crate::io::png;
 use crate::material::image::Image;
 use image::ExtendedColorType;
 
@@ -12,39 +12,65 @@ pub const RGBM_RANGE: f32 = 34.49;
 /// The power of its alpha.
 const RGBM_POWER: f32 = 2.2;
 
+/// Pixels as they are to be written.
+pub struct Picture {
+    bytes: Vec<u8>,
+    size: [usize; 2],
+    kind: ExtendedColorType,
+}
+
+impl Picture {
+    /// What pictures with the same pixels have in common, and no others.
+    pub fn key(&self) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        self.size.iter().for_each(|&n| {
+            hasher.update(&(n as u64).to_le_bytes());
+        });
+        *hasher.update(&self.bytes).finalize().as_bytes()
+    }
+
+    /// A file.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        png::encoded(&self.bytes, self.size, self.kind)
+    }
+}
+
+fn picture(bytes: Vec<u8>, size: [usize; 2], kind: ExtendedColorType) -> Picture {
+    Picture { bytes, size, kind }
+}
+
 /// A texture's colours, sRGB-encoded, with coverage where there is one: a value in [0, 1] a pixel.
-pub fn color(image: &Image, coverage: Option<&Image>) -> Result<Vec<u8>> {
+pub fn color(image: &Image, coverage: Option<&Image>) -> Picture {
     let size = [image.width, image.height];
     let display = |x: f32| byte(srgb(x));
     match coverage {
-        None => png(&each(size, |x, y| image.pixel(x, y).to_array().map(display)), size, ExtendedColorType::Rgb8),
+        None => picture(each(size, |x, y| image.pixel(x, y).to_array().map(display)), size, ExtendedColorType::Rgb8),
         Some(coverage) => {
             let pixel = |x, y| {
                 let [r, g, b] = image.pixel(x, y).to_array().map(display);
                 [r, g, b, byte(at(coverage, x, y, size))]
             };
-            png(&each(size, pixel), size, ExtendedColorType::Rgba8)
+            picture(each(size, pixel), size, ExtendedColorType::Rgba8)
         }
     }
 }
 
 /// Numbers in [0, 1] as they are.
-pub fn linear(image: &Image) -> Result<Vec<u8>> {
+pub fn linear(image: &Image) -> Picture {
     let size = [image.width, image.height];
-    png(&each(size, |x, y| image.pixel(x, y).to_array().map(byte)), size, ExtendedColorType::Rgb8)
+    picture(each(size, |x, y| image.pixel(x, y).to_array().map(byte)), size, ExtendedColorType::Rgb8)
 }
 
 /// Roughness in green and metalness in blue, at the size of the larger image.
-pub fn roughness_metalness(roughness: &Image, metalness: &Image) -> Result<Vec<u8>> {
+pub fn roughness_metalness(roughness: &Image, metalness: &Image) -> Picture {
     let size = [roughness.width.max(metalness.width), roughness.height.max(metalness.height)];
     let pixel = |x, y| [255, byte(at(roughness, x, y, size)), byte(at(metalness, x, y, size))];
-    png(&each(size, pixel), size, ExtendedColorType::Rgb8)
+    picture(each(size, pixel), size, ExtendedColorType::Rgb8)
 }
 
 /// Radiance or irradiance of any size: colour times 34.49 alpha^2.2, as `MX_lightmap` decodes it.
-pub fn rgbm(pixels: &[Rgb], size: [usize; 2]) -> Result<Vec<u8>> {
-    let bytes: Vec<u8> = pixels.iter().flat_map(|p| rgbm_pixel(*p)).collect();
-    png(&bytes, size, ExtendedColorType::Rgba8)
+pub fn rgbm(pixels: &[Rgb], size: [usize; 2]) -> Picture {
+    picture(pixels.iter().flat_map(|p| rgbm_pixel(*p)).collect(), size, ExtendedColorType::Rgba8)
 }
 
 /// The least alpha that holds the largest channel, and the channels under it.
@@ -58,8 +84,8 @@ fn rgbm_pixel(p: Rgb) -> [u8; 4] {
 }
 
 /// A picture's luminance relative to its brightest, for viewers that know occlusion alone.
-pub fn occlusion(shares: &[f32], size: [usize; 2]) -> Result<Vec<u8>> {
-    png(&shares.iter().map(|&x| byte(x)).collect::<Vec<u8>>(), size, ExtendedColorType::L8)
+pub fn occlusion(shares: &[f32], size: [usize; 2]) -> Picture {
+    picture(shares.iter().map(|&x| byte(x)).collect(), size, ExtendedColorType::L8)
 }
 
 /// The red of the pixel at a place of an image of another size.

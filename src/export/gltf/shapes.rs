@@ -13,9 +13,20 @@ pub struct Shape {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     uvs: Vec<Vec2>,
-    /// Of the light map, in [0, 1]².
-    atlas: Vec<Vec2>,
+    /// Second coordinates, in [0, 1]² where light lies on them.
+    second: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
+}
+
+/// What the second texture coordinates are.
+#[derive(Clone, Copy)]
+pub enum Second<'a> {
+    /// There are none.
+    None,
+    /// Those that the scene came with.
+    Own,
+    /// Places in a light map.
+    Map(&'a LightMap),
 }
 
 /// Those of a shape's triangles whose backs the light map lights.
@@ -25,15 +36,20 @@ pub fn lit_behind(geometry: &Geometry, object: usize, map: &LightMap) -> Vec<u32
 }
 
 /// Some of a shape's triangles. Vertices are split where faces are flat and where charts of the light map part; `turned` shows the back.
-pub fn shape(geometry: &Geometry, object: usize, triangles: &[u32], map: Option<&LightMap>, turned: bool) -> Shape {
+pub fn shape(geometry: &Geometry, object: usize, triangles: &[u32], second: Second, turned: bool) -> Shape {
     let of = &geometry.objects[object];
     let mut shape =
-        Shape { positions: Vec::new(), normals: Vec::new(), uvs: Vec::new(), atlas: Vec::new(), triangles: Vec::new() };
+        Shape { positions: Vec::new(), normals: Vec::new(), uvs: Vec::new(), second: Vec::new(), triangles: Vec::new() };
     let mut numbers: HashMap<(u32, [u32; 2], [u32; 3]), u32> = HashMap::new();
     for &triangle in triangles {
         let corners = geometry.triangles[triangle as usize];
         let flat = geometry.area_normal(triangle).try_normalize().unwrap_or(Vec3::Y);
-        let places = map.and_then(|map| map.places(triangle)).unwrap_or([Vec2::ZERO; 3]);
+        let places = match second {
+            Second::None => None,
+            Second::Own => geometry.light_corners(triangle),
+            Second::Map(map) => map.places(triangle),
+        };
+        let places = places.unwrap_or([Vec2::ZERO; 3]);
         let mut written = [0, 1, 2].map(|k| {
             let vertex = corners[k];
             let normal = match of.face_normals {
@@ -46,7 +62,7 @@ pub fn shape(geometry: &Geometry, object: usize, triangles: &[u32], map: Option<
                 shape.positions.push(geometry.positions[vertex as usize]);
                 shape.normals.push(normal);
                 shape.uvs.push(geometry.uvs[vertex as usize]);
-                shape.atlas.push(places[k]);
+                shape.second.push(places[k]);
                 shape.positions.len() as u32 - 1
             })
         });
@@ -55,11 +71,12 @@ pub fn shape(geometry: &Geometry, object: usize, triangles: &[u32], map: Option<
         }
         shape.triangles.push(written);
     }
-    if map.is_none() {
-        shape.atlas.clear();
-    }
-    if !of.has_uvs && map.is_none() {
-        shape.uvs.clear();
+    if matches!(second, Second::None) {
+        shape.second.clear();
+        // The format has no second coordinates without first ones.
+        if !of.has_uvs {
+            shape.uvs.clear();
+        }
     }
     shape
 }
@@ -74,7 +91,7 @@ impl Shape {
             }
         };
         add("TEXCOORD_0", &self.uvs);
-        add("TEXCOORD_1", &self.atlas);
+        add("TEXCOORD_1", &self.second);
         let indices = writer.triangles(&self.triangles);
         let primitive: Value = json!({ "attributes": attributes, "indices": indices, "material": material });
         writer.push("meshes", json!({ "name": name, "primitives": [primitive] }))

@@ -1,8 +1,10 @@
 //! A GLB file as it grows.
 
+use super::pixels::Picture;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
@@ -15,6 +17,8 @@ pub struct Writer {
     lists: Map<String, Value>,
     used: Vec<&'static str>,
     binary: Vec<u8>,
+    /// Images by their pixels.
+    images: BTreeMap<[u8; 32], usize>,
 }
 
 impl Writer {
@@ -37,20 +41,27 @@ impl Writer {
         }
     }
 
-    /// Gives every material a texture of occlusion on the second texture coordinates.
-    pub fn occlude(&mut self, texture: usize) {
-        let materials = self.lists.get_mut("materials").and_then(Value::as_array_mut);
-        for material in materials.into_iter().flatten() {
-            material["occlusionTexture"] = json!({ "index": texture, "texCoord": 1 });
-        }
+    /// The same for an entry that may be there already.
+    fn once(&mut self, list: &str, entry: Value) -> usize {
+        let there = self.lists.get(list).and_then(Value::as_array);
+        let found = there.and_then(|entries| entries.iter().position(|e| *e == entry));
+        found.unwrap_or_else(|| self.push(list, entry))
     }
 
-    /// An image with the sampler that its texture has; returns the texture's number.
-    pub fn texture(&mut self, png: &[u8], name: &str, sampler: Value) -> usize {
-        let view = self.view(png, None);
-        let image = self.push("images", json!({ "bufferView": view, "mimeType": "image/png", "name": name }));
-        let sampler = self.push("samplers", sampler);
-        self.push("textures", json!({ "source": image, "sampler": sampler }))
+    /// An image with the sampler that its texture has; returns the texture's number. Pixels are encoded and written once.
+    pub fn texture(&mut self, picture: &Picture, name: &str, sampler: Value) -> Result<usize> {
+        let key = picture.key();
+        let image = match self.images.get(&key) {
+            Some(image) => *image,
+            None => {
+                let view = self.view(&picture.png()?, None);
+                let image = self.push("images", json!({ "bufferView": view, "mimeType": "image/png", "name": name }));
+                self.images.insert(key, image);
+                image
+            }
+        };
+        let sampler = self.once("samplers", sampler);
+        Ok(self.once("textures", json!({ "source": image, "sampler": sampler })))
     }
 
     /// An attribute of places, with the bounds that the format wants of them.

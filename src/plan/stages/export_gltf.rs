@@ -41,13 +41,7 @@ impl ExportGltf {
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         self.check()?;
         let clock = seconds();
-        // What a light map was baked for has no transmissive shapes.
-        let is_baked = self.lightmap.is_some() || self.ao.is_some();
-        let world = is_baked.then(|| cx.opaque_world(&self.scene)).transpose()?;
-        let loaded = if world.is_none() { Some(cx.load_scene(&self.scene)?) } else { None };
-        let Some(scene) = world.as_ref().map(|w| &w.scene).or(loaded.as_ref()) else {
-            return Err(Error::input(&self.scene, "no scene was read"));
-        };
+        let scene = &cx.load_scene(&self.scene)?;
         let map = self.lightmap.as_ref().map(|path| LightMap::load(path, scene)).transpose()?;
         let openness = self.ao.as_ref().map(|path| LightMap::load_openness(path, scene)).transpose()?;
         if let (Some(light), Some(open), Some(path)) = (&map, &openness, &self.ao)
@@ -68,18 +62,20 @@ impl ExportGltf {
         exported.warnings.iter().for_each(|warning| cx.listener.warn(&format!("{}: {warning}", self.scene.display())));
         atomic::write(&self.output, &exported.bytes)?;
         let (shapes, triangles) = (scene.geometry.objects.len(), scene.geometry.triangles.len());
-        let gltf::Exported { bytes, materials, behind, .. } = exported;
+        let gltf::Exported { bytes, materials, behind, kept, pages, .. } = exported;
         let (megabytes, seconds) = (bytes.len() as f64 / 1e6, clock());
         let texels = |map: &LightMap, what: &str| format!(", {what} of {} x {} texels", map.size[0], map.size[1]);
         let light = [map.map(|m| texels(&m, "a light map")), openness.map(|m| texels(&m, "ambient occlusion"))];
-        let light: String = light.into_iter().flatten().collect();
+        let own = (kept > 0).then(|| format!(", {kept} shapes' own layout on {pages} textures"));
+        let light: String = light.into_iter().chain([own]).flatten().collect();
         let output = self.output.display();
         Ok(Outcome {
             summary: format!(
                 "{output}: {shapes} shapes of {triangles} triangles, {materials} materials{light}; {megabytes:.1} MB in {seconds:.1} s"
             ),
             figures: json!({
-                "shapes": shapes, "triangles": triangles, "materials": materials, "behind": behind, "bytes": bytes.len(), "seconds": seconds
+                "shapes": shapes, "triangles": triangles, "materials": materials, "behind": behind, "own_layout": kept, "pages": pages,
+                "bytes": bytes.len(), "seconds": seconds
             }),
             ..Outcome::default()
         })
