@@ -165,7 +165,7 @@ impl Stage {
             Self::BakeTransport(s) => vec![&s.probes],
             Self::Relight(s) => vec![&s.probes],
             Self::ExportGltf(s) => s.lightmap.iter().collect(),
-            Self::ExportProbes(s) => vec![&s.lightfield],
+            Self::ExportProbes(s) => [&s.probes].into_iter().chain(&s.lightmap).collect(),
             Self::InspectLightfield(s) => vec![&s.probes],
             Self::InspectTransport(s) => vec![&s.probes],
             Self::Qhmap(s) => vec![&s.resmap],
@@ -192,7 +192,8 @@ impl Stage {
             Self::RenderPath(s) => [&s.scene].into_iter().chain(&s.path).chain(&s.match_time).collect(),
             Self::InspectLightfield(s) => [&s.scene].into_iter().chain(&s.path).collect(),
             Self::InspectTransport(s) => [&s.scene].into_iter().chain(&s.path).collect(),
-            Self::Qhmap(_) | Self::ExportProbes(_) | Self::View(_) | Self::Video(_) => vec![],
+            Self::ExportProbes(s) => s.scene.iter().collect(),
+            Self::Qhmap(_) | Self::View(_) | Self::Video(_) => vec![],
             Self::Compare(s) => s.second_reference.iter().collect(),
         }
     }

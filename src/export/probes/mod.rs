@@ -1,6 +1,7 @@
-//! Light field probes as engines take them: prefiltered cubes of reflections, and diffuse light as cubes, as a volume, and in harmonics.
+//! Probes as engines take them: prefiltered cubes of reflections, and diffuse light as cubes, as a volume, and in harmonics.
 
 pub mod cube;
+pub mod look;
 pub mod volume;
 
 use crate::base::math::Rgb;

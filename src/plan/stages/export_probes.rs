@@ -4,17 +4,26 @@ use crate::base::clock::seconds;
 use crate::base::named::words;
 use crate::export::ktx2::{self, Texture};
 use crate::export::probes::cube::{self, Mirror};
+use crate::export::probes::look::look;
 use crate::export::probes::{Around, Probe, volume};
+use crate::io::provenance::hash_file;
 use crate::io::{Provenance, atomic, json};
+use crate::lightmap::LightMap;
 use crate::method::light_field_probes::probe::Light;
 use crate::method::light_field_probes::store::{LightFieldSet, files};
+use crate::method::radiance_probes::store::TransportSet;
 use crate::plan::option::{stage, text};
 use crate::plan::{Context, Outcome};
-use crate::probe::store::set_hash;
+use crate::probe::places::Places;
+use crate::probe::store::{ProbeStore, SET_FILE, read_set, set_hash};
+use crate::transport::World;
 use crate::{Error, Result};
 use glam::Vec3;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Texels along an edge of a cube of reflections.
 pub const SIZE: u32 = 128;
@@ -33,13 +42,17 @@ words!(Format { Ktx2 "ktx2" });
 text!(Format, Mirror);
 
 stage! {
-    /// Writes light field probes as textures for engines.
+    /// Writes probes as textures for engines.
     ExportProbes "export-probes"
     {
-        /// Folder of light field probes.
-        lightfield,
+        /// Folder of baked probes.
+        probes,
     }
     {
+        /// The scene, for probes that do not hold all light.
+        "--scene" scene: Option<PathBuf>,
+        /// Its light map, for these.
+        "--lightmap" lightmap: Option<PathBuf>,
         /// Format of the textures.
         "--format" format: Option<Format>,
         /// Texels along an edge of a cube of reflections.
@@ -59,30 +72,37 @@ impl ExportProbes {
         }
     }
 
-    /// Refuses a size that has no levels.
+    /// Refuses a size that has no levels, and a scene without its light.
     pub fn check(&self) -> Result<()> {
+        if self.scene.is_some() != self.lightmap.is_some() {
+            return Err(Error::Request("--scene, --lightmap: expected both or neither".into()));
+        }
         self.size().map(|_| ())
     }
 
     /// Reads the probes one by one, writes their textures.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         let (size, mirror, clock) = (self.size()?, self.mirror.unwrap_or_default(), seconds());
-        let set = LightFieldSet::read(&self.lightfield)?;
+        let mut source = self.source(cx)?;
         std::fs::create_dir_all(&self.output).map_err(|e| Error::io(&self.output, e))?;
-        let used = set.places.used();
+        let Source { places, used, provenance: from, .. } = &source;
+        let (places, used) = (places.clone(), used.clone());
         let parameters = json!({ "size": size, "mirror": mirror });
-        let provenance = Provenance::new(Self::COMMAND, &set.provenance.scene, cx.seed, &parameters)
-            .with_input("probes", set_hash(&self.lightfield, LIGHTFIELD)?);
+        let mut provenance = Provenance::new(Self::COMMAND, &from.scene, cx.seed, &parameters)
+            .with_input("probes", set_hash(&self.probes, &from.stage)?);
+        if let Some(lightmap) = &self.lightmap {
+            provenance = provenance.with_input("lightmap", hash_file(lightmap)?);
+        }
         cx.progress().start("probes for engines", used.len() as u64);
-        let mut around: Vec<Option<Around>> = vec![None; set.places.len()];
+        let mut around: Vec<Option<Around>> = vec![None; places.len()];
         let (mut entries, mut bytes) = (Vec::new(), 0);
         for &i in &used {
-            let probe = read(&set, &self.lightfield, i)?;
+            let probe = source.probe(&self.probes, i)?;
             let names = [format!("{i:04}.ktx2"), format!("{i:04}_diffuse.ktx2")];
             bytes += self.write(&names[0], &cube::reflections(&probe, size, mirror), &provenance)?;
             bytes += self.write(&names[1], &cube::diffuse(&probe.around, mirror), &provenance)?;
             entries.push(json!({
-                "position": set.places.position(i).to_array(), "reflections": names[0], "diffuse": names[1],
+                "position": places.position(i).to_array(), "reflections": names[0], "diffuse": names[1],
                 "harmonics": probe.around.harmonics().map(|c| c.to_array())
             }));
             around[i] = Some(probe.around);
@@ -90,7 +110,7 @@ impl ExportProbes {
         }
         cx.progress().finish();
         let mut table = json!({ "probes": entries, "mirror": mirror, "levels": size.ilog2() + 1 });
-        if let Some(grid) = set.places.grid() {
+        if let Some(grid) = places.grid() {
             let texture = volume::volume(grid.counts, |i, normal| around[i].as_ref().map(|a| a.diffuse(normal)));
             bytes += self.write(VOLUME, &texture, &provenance)?;
             table["volume"] = extent(grid.origin, grid.spacing, grid.counts);
@@ -107,6 +127,52 @@ impl ExportProbes {
         })
     }
 
+    /// The set, and what is needed to see by it.
+    fn source(&self, cx: &Context) -> Result<Source> {
+        let path = self.probes.join(SET_FILE);
+        let text = read_set(&self.probes, "bake-lightfield, bake-probes or bake-transport")?;
+        let Stamp { provenance } = json::parse(&path, &text)?;
+        if provenance.stage == LIGHTFIELD {
+            if self.scene.is_some() {
+                return Err(Error::Request("--scene, --lightmap: light field probes hold all light by themselves".into()));
+            }
+            let set = LightFieldSet::read(&self.probes)?;
+            return Ok(Source { places: set.places.clone(), used: set.places.used(), provenance, kind: Kind::LightField(set) });
+        }
+        let (Some(scene), Some(lightmap)) = (&self.scene, &self.lightmap) else {
+            let message = format!(
+                "{} hold no diffuse light: give --scene SCENE and --lightmap FILE, whose light they see",
+                provenance.stage
+            );
+            return Err(Error::input(&self.probes, message));
+        };
+        let world = cx.opaque_world(scene)?;
+        let lightmap = LightMap::load(lightmap, &world.scene)?;
+        let (places, used, glossy) = match provenance.stage.as_str() {
+            GLOSSY => {
+                let store = ProbeStore::<IgnoredAny>::open(&self.probes, &world.scene, 1)?;
+                if store.set.views.is_some() {
+                    cx.listener.warn(&format!(
+                        "{}: baked for the views of a path: other glossy texels are black; bake without --for-path for all",
+                        self.probes.display()
+                    ));
+                }
+                let used = (0..store.set.places.len()).filter(|&i| !store.set.files[i].is_empty()).collect();
+                (store.set.places.clone(), used, Some(store))
+            }
+            TRANSPORT => {
+                let set = TransportSet::read(&self.probes)?;
+                set.provenance.check_scene(&path, &world.scene.hash)?;
+                (set.places.clone(), set.places.used(), None)
+            }
+            other => {
+                let message = format!("was written by {other}: expected a folder of {LIGHTFIELD}, {GLOSSY} or {TRANSPORT}");
+                return Err(Error::input(&path, message));
+            }
+        };
+        Ok(Source { places, used, provenance, kind: Kind::Lit { world, lightmap, glossy } })
+    }
+
     /// Writes a texture, unless somebody else's file has its name; returns its bytes.
     fn write(&self, name: &str, texture: &Texture, provenance: &Provenance) -> Result<usize> {
         let path = self.output.join(name);
@@ -121,9 +187,44 @@ impl ExportProbes {
 
 /// The stage that the probes come from.
 pub(super) const LIGHTFIELD: &str = "bake-lightfield";
+/// Others.
+const GLOSSY: &str = "bake-probes";
+const TRANSPORT: &str = "bake-transport";
 /// The file that says what there is.
 const TABLE: &str = "probes.json";
 const VOLUME: &str = "volume.ktx2";
+
+/// What every `set.json` says.
+#[derive(Deserialize)]
+struct Stamp {
+    provenance: Provenance,
+}
+
+/// Where probes come from.
+struct Source {
+    places: Places,
+    /// Those that there are.
+    used: Vec<usize>,
+    provenance: Provenance,
+    kind: Kind,
+}
+
+enum Kind {
+    LightField(LightFieldSet),
+    Lit { world: Arc<World>, lightmap: LightMap, glossy: Option<ProbeStore<IgnoredAny>> },
+}
+
+impl Source {
+    fn probe(&mut self, folder: &Path, i: usize) -> Result<Probe> {
+        match &mut self.kind {
+            Kind::LightField(set) => read(set, folder, i),
+            Kind::Lit { world, lightmap, glossy } => {
+                let glossy = glossy.as_mut().map(|store| store.probe(i)).transpose()?;
+                Ok(look(world, lightmap, self.places.position(i), glossy.as_deref()))
+            }
+        }
+    }
+}
 
 fn read(set: &LightFieldSet, folder: &Path, i: usize) -> Result<Probe> {
     let [_, light, around] = set.images(folder, i)?;
