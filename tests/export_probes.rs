@@ -16,7 +16,8 @@ const SCENE: &str = r#"<scene version="3.0.0">
 
 /// The mean over all directions of what a probe's diffuse light says.
 fn mean(f: &Folder, folder: &str) -> f64 {
-    let table: serde_json::Value = serde_json::from_slice(&std::fs::read(f.at(&format!("{folder}/probes.json"))).unwrap()).unwrap();
+    let table: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(f.at(&format!("{folder}/probes.json"))).unwrap()).unwrap();
     assert_eq!(table["probes"].as_array().unwrap().len(), 1);
     for file in ["0000.ktx2", "0000_diffuse.ktx2", "volume.ktx2"] {
         assert!(f.success(&format!("info {folder}/{file}")).contains("export-probes"), "{file}");

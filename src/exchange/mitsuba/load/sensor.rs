@@ -79,19 +79,10 @@ impl<'a> Builder<'a> {
         let window = self.film(p)?;
         // Axes and clipping planes are about the whole film, also where only a part of it is rendered.
         let fov_x = if parallel { 1.0 } else { fov_x(p, window.film)? };
-        // Perspective sensors of Mitsuba 0.6 carry a distance that they do not use.
-        let elsewhere = if lens { p.f32("far_clip", FAR)? } else { 1.0 };
-        let focus_distance = p.f32("focus_distance", elsewhere)?;
-        if focus_distance <= 0.0 {
-            return Err(p.at("focus_distance").error(format!("focus_distance = {focus_distance}: expected more than 0")));
-        }
-        let aperture_radius = if lens { p.f32("aperture_radius", 0.0)? } else { 0.0 };
-        if aperture_radius < 0.0 {
-            return Err(p.at("aperture_radius").error(format!("aperture_radius = {aperture_radius}: expected at least 0")));
-        }
         if lens && !p.has("aperture_radius") {
             return Err(node.at.error("thinlens has no \"aperture_radius\""));
         }
+        let (aperture_radius, focus_distance) = aperture_and_focus(p, lens)?;
         let principal_point = match parallel {
             true => Vec2::ZERO,
             false => Vec2::new(p.f32("principal_point_offset_x", 0.0)?, p.f32("principal_point_offset_y", 0.0)?),
@@ -188,6 +179,20 @@ impl<'a> Builder<'a> {
         params.finish(&mut self.scene.warnings);
         Ok(Some(filter))
     }
+}
+
+/// Aperture and distance of a lens; a sensor without one may have a distance all the same, which perspective sensors of Mitsuba 0.6 carry and do not use.
+fn aperture_and_focus(p: &mut Params, lens: bool) -> Result<(f32, f32)> {
+    let elsewhere = if lens { p.f32("far_clip", FAR)? } else { 1.0 };
+    let focus_distance = p.f32("focus_distance", elsewhere)?;
+    if focus_distance <= 0.0 {
+        return Err(p.at("focus_distance").error(format!("focus_distance = {focus_distance}: expected more than 0")));
+    }
+    let aperture_radius = if lens { p.f32("aperture_radius", 0.0)? } else { 0.0 };
+    if aperture_radius < 0.0 {
+        return Err(p.at("aperture_radius").error(format!("aperture_radius = {aperture_radius}: expected at least 0")));
+    }
+    Ok((aperture_radius, focus_distance))
 }
 
 /// `near_clip` and `far_clip`. *Ours*: without them nothing is cut off, where Mitsuba takes 0.01 and 10,000 in whatever unit.
