@@ -3,10 +3,10 @@
 use crate::base::clock::seconds;
 use crate::base::named::within;
 use crate::gpu::{GpuScene, Paths};
+use crate::io::Provenance;
 use crate::io::jobs::{Done, Shard, is_finished, touch};
-use crate::io::{ExrImage, Provenance};
 use crate::lightmap::parts::Folder;
-use crate::lightmap::{AtlasParams, Baked, DenoiseParams, LightMap, LightMapParams, Plan, lookup};
+use crate::lightmap::{AtlasParams, DenoiseParams, LightMap, LightMapParams, Plan, lookup};
 use crate::plan::option::stage;
 use crate::plan::{Context, Outcome};
 use crate::transport::World;
@@ -85,33 +85,54 @@ impl BakeLightmap {
         let provenance = Provenance::new(Self::COMMAND, &world.scene.hash, cx.seed, &params);
         let key = serde_json::to_string(&provenance).map_err(|e| Error::Request(e.to_string()))?;
         let [first_store, store] = [".first.parts", ".parts"].map(|ending| Folder::new(&beside(&self.output, ending), &key));
-        if is_finished(&self.output, &provenance) {
-            touch(&self.output);
-            // Of a second run at the same time, or of one with other options that was killed.
+        let up_to_date = || {
+            // Blocks of a second run at the same time, or of one with other options that was killed.
             first_store.remove()?;
             store.remove()?;
-            return Ok(Outcome::up_to_date(&self.output, json!({ "up_to_date": true })));
+            Ok(Outcome::up_to_date(&self.output, json!({ "up_to_date": true })))
+        };
+        if is_finished(&self.output, &provenance) {
+            touch(&self.output);
+            return up_to_date();
         }
-        let plan = Plan::new(&world, &params, cx.seed)?;
+        match self.bake(cx, &world, (&params, &provenance), [&first_store, &store], (clock, loaded)) {
+            // Another run was faster, and has deleted the blocks.
+            Err(_) if is_finished(&self.output, &provenance) => up_to_date(),
+            baked => baked,
+        }
+    }
+
+    /// Bakes the blocks that are missing; the run that makes the last one writes the map.
+    fn bake(
+        &self,
+        cx: &Context,
+        world: &World,
+        (params, provenance): (&LightMapParams, &Provenance),
+        [first_store, store]: [&Folder; 2],
+        (clock, loaded): (impl Fn() -> f64, f64),
+    ) -> Result<Outcome> {
+        let plan = Plan::new(world, params, cx.seed)?;
         let planned = clock() - loaded;
 
         // Rays of ambient occlusion are followed on the CPU.
-        let scene = if params.ao.is_none() { cx.on_gpu(|gpu| GpuScene::new(gpu, &world))? } else { None };
-        let first = self.first_pass(cx, &plan, &params, &first_store, scene.as_ref())?;
+        let scene = if params.ao.is_none() { cx.on_gpu(|gpu| GpuScene::new(gpu, world))? } else { None };
+        let first = self.first_pass(cx, &plan, params, first_store, scene.as_ref())?;
         let scene = match (scene, &first) {
             (Some(scene), Some(map)) => Some(scene.with_lightmap(map)?),
             (scene, _) => scene,
         };
-        let device = on_gpu(scene, &params)?;
+        let device = on_gpu(scene, params)?;
         let device = device.as_ref().map(|d| d as &dyn Follow);
         let pass = plan.second_pass(first.as_ref()).on(device);
-        let done = plan.run(&pass, &store, self.shard, cx.progress(), || {
-            let assemble = || plan.assemble(&pass, &store, cx.progress());
-            write(&plan, &world, &assemble, &provenance, &self.output)?;
+        let done = plan.run(&pass, store, self.shard, cx.progress(), || {
+            let baked = plan.assemble(&pass, store, cx.progress())?;
+            let encode = if plan.is_light() { lookup::encode } else { lookup::encode_openness };
+            let image = encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone());
+            image.write(&self.output)?;
             store.remove()?;
             first_store.remove()
         })?;
-        Ok(self.outcome(&plan, &params, done, device.map_or("cpu", Follow::device), [loaded, planned, clock()]))
+        Ok(self.outcome(&plan, params, done, device.map_or("cpu", Follow::device), [loaded, planned, clock()]))
     }
 
     /// The map of the first pass, where there is one; every shard needs all of it.
@@ -166,16 +187,4 @@ fn beside(output: &Path, ending: &str) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
     name.push(ending);
     name.into()
-}
-
-/// Puts the blocks together and writes the map.
-fn write(plan: &Plan, world: &World, assemble: &dyn Fn() -> Result<Baked>, provenance: &Provenance, output: &Path) -> Result<()> {
-    let baked = match assemble() {
-        Ok(baked) => baked,
-        // Another shard was faster and has deleted the blocks.
-        Err(_) if ExrImage::read(output).is_ok_and(|i| i.provenance.as_ref() == Some(provenance)) => return Ok(()),
-        Err(e) => return Err(e),
-    };
-    let encode = if plan.is_light() { lookup::encode } else { lookup::encode_openness };
-    encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone()).write(output)
 }
