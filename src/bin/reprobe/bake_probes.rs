@@ -41,7 +41,8 @@ pub struct Args {
     /// Factor on roughness at the first glossy vertex [default: 1; with --paper 0.5]
     #[arg(long, value_name = "S")]
     roughness_scale: Option<f32>,
-    /// Take the noise out of the texels, by a filter along each reflector that keeps what differs by more than the noise
+    /// Take the noise out of the texels, by a filter along each reflector that keeps what differs by more than the noise. For probes
+    /// that are looked at or handed on: frames average the noise of few paths by themselves
     #[arg(long)]
     denoise: bool,
     /// Spread a texel's paths over its solid angle, in place of sending all through its centre
