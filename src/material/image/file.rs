@@ -130,6 +130,9 @@ fn read_other(path: &Path, bytes: &[u8], options: ReadOptions, odd: &mut Vec<Str
     let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(|e| Error::io(path, e))?;
     match reader.format() {
         None => reader.set_format(ImageFormat::from_path(path).map_err(bad)?),
+        Some(ImageFormat::Png) if !palette_is_whole(&bytes) => {
+            return Err(Error::input(path, "not a readable image: its palette is no list of up to 256 colours of three bytes"));
+        }
         Some(ImageFormat::Jpeg) if !jpeg_is_whole(&bytes) => {
             let early = "the picture's data ends early: its JPEG has no end marker";
             if !options.allow_truncated {
@@ -151,6 +154,20 @@ fn read_other(path: &Path, bytes: &[u8], options: ReadOptions, odd: &mut Vec<Str
         return Err(Error::input(path, message));
     }
     DynamicImage::from_decoder(decoder).map(|decoded| linear(decoded, options.take)).map_err(bad)
+}
+
+/// Whether a PNG file's palette, where it has one, is as the format says; the crate that decodes it takes that for granted.
+fn palette_is_whole(png: &[u8]) -> bool {
+    let mut rest = png.get(8..).unwrap_or_default();
+    while let Some((&[a, b, c, d, ref kind @ ..], content)) = rest.split_first_chunk::<8>() {
+        let length = u32::from_be_bytes([a, b, c, d]) as usize;
+        if kind == b"PLTE" && (!length.is_multiple_of(3) || length > 3 * 256) {
+            return false;
+        }
+        // After its content comes a checksum.
+        rest = content.get(length.saturating_add(4)..).unwrap_or_default();
+    }
+    true
 }
 
 fn limits() -> image::Limits {
