@@ -1,6 +1,6 @@
 //! EXR images of named channels, with provenance.
 
-use super::flat::{self, Flat};
+use super::flat::{self, Flat, Samples};
 use super::subsampled::{self, Subsampled};
 use super::{Provenance, atomic, primaries, seal};
 use crate::base::math::Rgb;
@@ -13,18 +13,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 /// Most pixels that an image may have: untrusted files do not get to allocate more.
-pub(super) const MAX_PIXELS: usize = 1 << 28;
-
-/// Samples of one channel, rows from the top.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Samples {
-    /// Half floats.
-    F16(Vec<f16>),
-    /// Floats.
-    F32(Vec<f32>),
-    /// Unsigned integers.
-    U32(Vec<u32>),
-}
+const MAX_PIXELS: usize = 1 << 28;
 
 /// An image of named channels (`glossy.R`, `m_size`, ...), all of one size.
 #[derive(Debug, Clone, PartialEq)]
@@ -258,7 +247,7 @@ impl ExrImage {
             let to_rec709 = primaries.map(matrix).transpose()?.flatten();
             return Ok(Self { width, height, channels, provenance: None, to_rec709 });
         }
-        let Flat { header, samples } = flat::read(bytes).map_err(bad)?;
+        let Flat { header, samples } = flat::read(bytes, MAX_PIXELS).map_err(bad)?;
         let provenance = provenance(path, &header.own_attributes)?;
         let named = header.shared_attributes.chromaticities.as_ref();
         let named = named.map(|c| [c.red, c.green, c.blue, c.white].map(|e::Vec2(x, y)| [x, y]));

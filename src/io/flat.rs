@@ -4,7 +4,6 @@
 //! file's table is for, and write where it says itself; here such a file is an error.
 
 use super::could_hold;
-use super::exr::{MAX_PIXELS, Samples};
 use exr::block::UncompressedBlock;
 use exr::block::lines::LineRef;
 use exr::block::reader::ChunksReader;
@@ -24,16 +23,27 @@ const BATCH: usize = 64;
 /// The level of an image that is all of it; others are smaller copies.
 const WHOLE: Vec2<usize> = Vec2(0, 0);
 
+/// Samples of one channel, rows from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Samples {
+    /// Half floats.
+    F16(Vec<f16>),
+    /// Floats.
+    F32(Vec<f32>),
+    /// Unsigned integers.
+    U32(Vec<u32>),
+}
+
 /// A part of a file: its header, and the samples of its channels, in the header's order.
 pub struct Flat {
     pub header: Header,
     pub samples: Vec<Samples>,
 }
 
-/// Reads the bytes of an EXR file.
-pub fn read(bytes: &[u8]) -> Result<Flat> {
+/// Reads the bytes of an EXR file whose parts have at most `most` pixels each.
+pub fn read(bytes: &[u8], most: usize) -> Result<Flat> {
     let reader = exr::block::read(Cursor::new(bytes), false)?;
-    check_sizes(reader.headers(), bytes.len())?;
+    check_sizes(reader.headers(), bytes.len(), most)?;
     let part = reader.headers().iter().position(is_flat);
     let part = part.ok_or(Error::NotSupported("no part has a sample for each channel and pixel".into()))?;
     let mut chunks = reader.filter_chunks(false, |_, tile, block| block.layer == part && tile.level_index == WHOLE)?;
@@ -71,13 +81,13 @@ fn is_flat(header: &Header) -> bool {
     !header.deep && header.channels.list.iter().all(|c| c.sampling == Vec2(1, 1))
 }
 
-/// An error where a part has too many pixels, or all of them more than `bytes` could hold.
-fn check_sizes(headers: &[Header], bytes: usize) -> Result<()> {
+/// An error where a part has more than `most` pixels, or all of them more than `bytes` could hold.
+fn check_sizes(headers: &[Header], bytes: usize, most: usize) -> Result<()> {
     let mut all = 0u64;
     for header in headers {
         let (Vec2(width, height), each) = (header.layer_size, header.channels.bytes_per_pixel as u64);
-        if width.saturating_mul(height) > MAX_PIXELS {
-            return Err(invalid(format!("{width} x {height} pixels are more than the {MAX_PIXELS} allowed")));
+        if width.saturating_mul(height) > most {
+            return Err(invalid(format!("{width} x {height} pixels are more than the {most} allowed")));
         }
         all = all.saturating_add((width as u64 * height as u64).saturating_mul(each));
     }

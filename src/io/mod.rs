@@ -17,7 +17,8 @@ mod subsampled;
 mod text;
 pub mod video;
 
-pub use exr::{ExrImage, Samples};
+pub use exr::ExrImage;
+pub use flat::Samples;
 pub use provenance::Provenance;
 pub use seal::{HEAD, is_sealed};
 pub use text::{read, read_named, read_text, text};

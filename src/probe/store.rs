@@ -112,6 +112,12 @@ struct Source {
     provenance: Provenance,
 }
 
+/// Where a folder's `set.json` came from, whichever stage wrote it; `stages` are those that may have.
+pub fn set_provenance(folder: &Path, stages: &str) -> Result<Provenance> {
+    let text = read_set(folder, stages)?;
+    Ok(json::parse::<Source>(&folder.join(SET_FILE), &text)?.provenance)
+}
+
 /// A folder's `set.json`, which `stage` must have written; `None` where another stage did.
 pub fn read_set_of<T: DeserializeOwned>(folder: &Path, stage: &str) -> Result<Option<T>> {
     let path = folder.join(SET_FILE);

@@ -130,7 +130,7 @@ pub struct Traced {
 
 /// Sums over the paths of one texel, and how many they were.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Sums {
+struct Sums {
     paths: u32,
     of: PathSum,
 }
@@ -141,7 +141,7 @@ impl Sums {
     }
 
     /// The mean, and the variance of its luminance; of one path that is not known.
-    pub(super) fn light(&self) -> Light {
+    fn light(&self) -> Light {
         let n = f64::from(self.paths);
         let variance = (self.of.squares - self.of.luminance * self.of.luminance / n).max(0.0) / (n * (n - 1.0));
         Light { color: self.of.color / self.paths as f32, variance: if self.paths > 1 { variance as f32 } else { f32::INFINITY } }
@@ -149,9 +149,9 @@ impl Sums {
 }
 
 /// What the centre of a texel sees: where its paths begin.
-pub(super) struct Centre {
-    pub(super) texel: u32,
-    pub(super) hit: Hit,
+struct Centre {
+    texel: u32,
+    hit: Hit,
     stream: u32,
 }
 
@@ -186,9 +186,13 @@ pub fn bake_glossy(
             first.into_iter().zip(rest).map(|(first, rest)| first.and(rest)).collect()
         }
     };
+    let light: Vec<Light> = sums.iter().map(Sums::light).collect();
     let glossy = match &bake.params.denoise {
-        Some(params) => denoised(bake.world, probe, &centres, &sums, (params, bake.params.roughness_scale)),
-        None => sums.iter().map(|sums| sums.light().color).collect(),
+        Some(params) => {
+            let texels: Vec<(u32, Hit)> = centres.iter().map(|centre| (centre.texel, centre.hit)).collect();
+            denoised(bake.world, probe, &texels, &light, (params, bake.params.roughness_scale))
+        }
+        None => light.iter().map(|light| light.color).collect(),
     };
     let mut traced = Traced::default();
     let mirrored: Vec<Option<Rgb>> = centres.par_iter().map(|centre| mirrored(bake, probe, centre)).collect();

@@ -5,11 +5,11 @@
 //! other there and show one smooth surface of one material. How far they share light is bounded by how soon their lobes part: where a lobe is narrow, what it
 //! reflects may change from texel to texel, and what a mirror shows stays as sharp as it is.
 //!
-//! In: the hits of texels and the sums over their paths. Out: radiance a texel. A texel's value depends on its probe alone.
+//! In: texels, what they hit, and their light. Out: radiance a texel. A texel's value depends on its probe alone.
 
-use super::bake::{Centre, Sums};
 use crate::base::math::{Rgb, reflect};
 use crate::base::progress::Silent;
+use crate::base::ray::Hit;
 use crate::lightmap::DenoiseParams;
 use crate::lightmap::denoise::{Light, Surfaces};
 use crate::lightmap::links::{Links, Site};
@@ -17,7 +17,7 @@ use crate::lightmap::texels::Point;
 use crate::material::Surface;
 use crate::probe::file::Probe;
 use crate::transport::World;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Least cosine between the normals of texels that are linked (25 degrees).
@@ -31,27 +31,23 @@ const PART: f32 = 8.0;
 /// Least reach, texels: none.
 const LEAST_REACH: f32 = 1e-3;
 
-/// Radiance of the texels of `centres` without most of their noise; `roughness_scale` as in the bake.
+/// Radiance of texels, whose rays hit what stands beside them, without most of their noise; `roughness_scale` as in the bake.
 pub(super) fn denoised(
     world: &World,
     probe: &Probe,
-    centres: &[Centre],
-    sums: &[Sums],
+    texels: &[(u32, Hit)],
+    light: &[Light],
     (params, roughness_scale): (&DenoiseParams, f32),
 ) -> Vec<Rgb> {
     let size = probe.size;
-    let seen: Vec<Surface> = centres.par_iter().map(|centre| world.surface(&centre.hit)).collect();
-    let sites: Vec<Site> = centres.iter().zip(&seen).map(|(centre, surface)| site(centre, surface, size[0])).collect();
-    let links = links(centres, &seen, size);
-    let light: Vec<Light> = sums.iter().map(Sums::light).collect();
-    let lobes: Vec<Lobe> = centres
-        .iter()
-        .zip(&seen)
-        .map(|(centre, surface)| Lobe::new(world, probe, centre.texel, surface, roughness_scale))
-        .collect();
+    let seen: Vec<Surface> = texels.par_iter().map(|(_, hit)| world.surface(hit)).collect();
+    let sites: Vec<Site> = texels.iter().zip(&seen).map(|(&(texel, _), surface)| site(texel, surface, size[0])).collect();
+    let links = links(texels, &seen, size);
+    let lobe = |(&(texel, _), surface)| Lobe::new(world, probe, texel, surface, roughness_scale);
+    let lobes: Vec<Lobe> = texels.iter().zip(&seen).map(lobe).collect();
     let reach: Vec<f32> = (0..sites.len()).map(|i| reach(i, &sites, &links, &lobes)).collect();
     let surfaces = Surfaces { sites: &sites, links: &links, texel: 1.0, params, reach: Some(&reach) };
-    let clean = surfaces.denoise(&light, &Silent);
+    let clean = surfaces.denoise(light, &Silent);
     clean.into_iter().map(|light| light.color).collect()
 }
 
@@ -90,11 +86,11 @@ fn reach(i: usize, sites: &[Site], links: &Links, lobes: &[Lobe]) -> f32 {
 }
 
 /// A texel as a site of a plane: the map itself.
-fn site(centre: &Centre, surface: &Surface, width: u32) -> Site {
+fn site(texel: u32, surface: &Surface, width: u32) -> Site {
     Site {
-        item: centre.texel,
-        point: Point { triangle: centre.hit.triangle, barycentric: Vec2::new(centre.hit.u, centre.hit.v) },
-        position: Vec3::new((centre.texel % width) as f32, (centre.texel / width) as f32, 0.0),
+        item: texel,
+        point: Point { triangle: surface.triangle, barycentric: surface.barycentric },
+        position: Vec3::new((texel % width) as f32, (texel / width) as f32, 0.0),
         normal: Vec3::Z,
         material: surface.material,
         in_part: false,
@@ -102,11 +98,11 @@ fn site(centre: &Centre, surface: &Surface, width: u32) -> Site {
 }
 
 /// Texels beside one another that show one smooth surface. The map's left and right border are not joined: a fit of first order does well on one side.
-fn links(centres: &[Centre], seen: &[Surface], [width, height]: [u32; 2]) -> Links {
+fn links(texels: &[(u32, Hit)], seen: &[Surface], [width, height]: [u32; 2]) -> Links {
     let mut at = vec![u32::MAX; (width * height) as usize];
-    centres.iter().enumerate().for_each(|(i, centre)| at[centre.texel as usize] = i as u32);
+    texels.iter().enumerate().for_each(|(i, (texel, _))| at[*texel as usize] = i as u32);
     let of = |i: usize| {
-        let (x, y) = ((centres[i].texel % width) as i64, (centres[i].texel / width) as i64);
+        let (x, y) = ((texels[i].0 % width) as i64, (texels[i].0 / width) as i64);
         // Straight neighbours first: the nearest.
         let around = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
         let inside = around.into_iter().map(|(dx, dy)| (x + dx, y + dy));
@@ -114,7 +110,7 @@ fn links(centres: &[Centre], seen: &[Surface], [width, height]: [u32; 2]) -> Lin
         let neighbours = inside.map(|(x, y)| at[(y * i64::from(width) + x) as usize]).filter(|&j| j != u32::MAX);
         neighbours.filter(|&j| are_one(&seen[i], &seen[j as usize])).collect()
     };
-    Links::of((0..centres.len()).into_par_iter().map(of).collect())
+    Links::of((0..texels.len()).into_par_iter().map(of).collect())
 }
 
 /// Whether two points lie on one smooth surface of one material.

@@ -15,11 +15,10 @@ use crate::method::radiance_probes::store::TransportSet;
 use crate::plan::option::{stage, text};
 use crate::plan::{Context, Outcome};
 use crate::probe::places::Places;
-use crate::probe::store::{ProbeStore, SET_FILE, read_set, set_hash};
+use crate::probe::store::{ProbeStore, SET_FILE, set_hash, set_provenance};
 use crate::transport::World;
 use crate::{Error, Result};
 use glam::Vec3;
-use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -83,10 +82,8 @@ impl ExportProbes {
     /// Reads the probes one by one, writes their textures.
     pub fn run(&self, cx: &Context) -> Result<Outcome> {
         let (size, mirror, clock) = (self.size()?, self.mirror.unwrap_or_default(), seconds());
-        let mut source = self.source(cx)?;
+        let Source { places, used, provenance: from, mut kind } = self.source(cx)?;
         std::fs::create_dir_all(&self.output).map_err(|e| Error::io(&self.output, e))?;
-        let Source { places, used, provenance: from, .. } = &source;
-        let (places, used) = (places.clone(), used.clone());
         let parameters = json!({ "size": size, "mirror": mirror });
         let mut provenance = Provenance::new(Self::COMMAND, &from.scene, cx.seed, &parameters)
             .with_input("probes", set_hash(&self.probes, &from.stage)?);
@@ -97,7 +94,7 @@ impl ExportProbes {
         let mut around: Vec<Option<Around>> = vec![None; places.len()];
         let (mut entries, mut bytes) = (Vec::new(), 0);
         for &i in &used {
-            let probe = source.probe(&self.probes, i)?;
+            let probe = kind.probe(&self.probes, i, places.position(i))?;
             let names = [format!("{i:04}.ktx2"), format!("{i:04}_diffuse.ktx2")];
             bytes += self.write(&names[0], &cube::reflections(&probe, size, mirror), &provenance)?;
             bytes += self.write(&names[1], &cube::diffuse(&probe.around, mirror), &provenance)?;
@@ -130,8 +127,7 @@ impl ExportProbes {
     /// The set, and what is needed to see by it.
     fn source(&self, cx: &Context) -> Result<Source> {
         let path = self.probes.join(SET_FILE);
-        let text = read_set(&self.probes, "bake-lightfield, bake-probes or bake-transport")?;
-        let Stamp { provenance } = json::parse(&path, &text)?;
+        let provenance = set_provenance(&self.probes, "bake-lightfield, bake-probes or bake-transport")?;
         if provenance.stage == LIGHTFIELD {
             if self.scene.is_some() {
                 return Err(Error::Request("--scene, --lightmap: light field probes hold all light by themselves".into()));
@@ -194,12 +190,6 @@ const TRANSPORT: &str = "bake-transport";
 const TABLE: &str = "probes.json";
 const VOLUME: &str = "volume.ktx2";
 
-/// What every `set.json` says.
-#[derive(Deserialize)]
-struct Stamp {
-    provenance: Provenance,
-}
-
 /// Where probes come from.
 struct Source {
     places: Places,
@@ -214,13 +204,13 @@ enum Kind {
     Lit { world: Arc<World>, lightmap: LightMap, glossy: Option<ProbeStore<IgnoredAny>> },
 }
 
-impl Source {
-    fn probe(&mut self, folder: &Path, i: usize) -> Result<Probe> {
-        match &mut self.kind {
-            Kind::LightField(set) => read(set, folder, i),
-            Kind::Lit { world, lightmap, glossy } => {
+impl Kind {
+    fn probe(&mut self, folder: &Path, i: usize, position: Vec3) -> Result<Probe> {
+        match self {
+            Self::LightField(set) => read(set, folder, i),
+            Self::Lit { world, lightmap, glossy } => {
                 let glossy = glossy.as_mut().map(|store| store.probe(i)).transpose()?;
-                Ok(look(world, lightmap, self.places.position(i), glossy.as_deref()))
+                Ok(look(world, lightmap, position, glossy.as_deref()))
             }
         }
     }
