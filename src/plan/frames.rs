@@ -99,22 +99,20 @@ fn after_those_before(
     samples: u32,
     progress: &dyn Progress,
 ) -> Result<Frame> {
+    let mut progress = Some(progress);
     let mut first = i;
-    loop {
+    let mut frame = loop {
         renderer.forget();
-        let frame = renderer.frame(&views[first], views.get(first + 1), samples, if first == i { progress } else { &Silent })?;
-        if first == i && (i == 0 || frame.unserved == Some(0)) {
-            return Ok(frame);
-        }
+        let frame = renderer.frame(&views[first], views.get(first + 1), samples, progress.take().unwrap_or(&Silent))?;
         if first == 0 || frame.unserved == Some(0) {
-            break;
+            break frame;
         }
         first -= 1;
+    };
+    for later in first + 1..=i {
+        frame = renderer.frame(&views[later], views.get(later + 1), samples, &Silent)?;
     }
-    for between in first + 1..i {
-        renderer.frame(&views[between], views.get(between + 1), samples, &Silent)?;
-    }
-    renderer.frame(&views[i], views.get(i + 1), samples, &Silent)
+    Ok(frame)
 }
 
 /// The renderer, made when it is first needed.

@@ -6,7 +6,7 @@ use crate::io::layer::{IMAGE, Kind, Layer, layers, most_telling, named};
 use crate::io::picture::{self, Look, Picture};
 use crate::io::provenance::hash_of;
 use crate::io::sheet::{self, Cell, MOST_PIXELS};
-use crate::io::{ExrImage, Provenance, png};
+use crate::io::{self, ExrImage, Provenance, png};
 use crate::plan::option::{List, stage};
 use crate::plan::{Context, Outcome};
 use crate::{Error, Result};
@@ -102,7 +102,7 @@ impl View {
 
     /// The layers of a file that are asked for.
     fn draw(&self, file: &Path) -> Result<(Vec<Shown>, Origin)> {
-        let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
+        let bytes = io::read(file)?;
         let image = ExrImage::from_bytes(file, &bytes)?;
         let origin = Origin { hash: hash_of(&bytes), scene: image.provenance.as_ref().map(|p| p.scene.clone()) };
         let all = layers(&image);
