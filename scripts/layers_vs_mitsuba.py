@@ -41,13 +41,13 @@ TILE = 15
 CAP_PERCENTILE = 99.5
 
 
-def read_layers(mi, path):
+def read_layers(mi, path, layers=LAYERS):
     """Layer name to an array of height x width x 3."""
     bitmap = mi.Bitmap(path)
     channels = {bitmap.struct_()[i].name: i for i in range(bitmap.channel_count())}
     pixels = np.array(bitmap, dtype=np.float64)
     pick = lambda layer: pixels[:, :, [channels[c if layer == "full" else f"{layer}.{c}"] for c in "RGB"]]
-    return {layer: pick(layer) for layer in LAYERS}
+    return {layer: pick(layer) for layer in layers}
 
 
 def render(command, output):

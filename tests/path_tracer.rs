@@ -2,7 +2,7 @@
 
 mod room;
 
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{Affine3A, DVec3, Vec2, Vec3};
 use reprobe::base::math::Rgb;
 use reprobe::base::progress::Silent;
 use reprobe::base::ray::Ray;
@@ -10,12 +10,13 @@ use reprobe::material::bsdf::{
     Bsdf, Conductor, Diffuse, Distribution, Lobes, PlasticParams, Query, RoughConductor, RoughPlastic,
 };
 use reprobe::material::{Surface, Texture};
-use reprobe::method::path_trace::{PathTraceParams, path_trace};
+use reprobe::method::path_trace::{PathTraceParams, path_trace, path_trace_full};
 use reprobe::scene::{Camera, Emitter};
 use reprobe::transport::light_tree::Receiver;
 use reprobe::transport::lights::Lights;
 use reprobe::transport::path::{PathParams, radiance, scattered, trace_layers, transmitted_irradiance};
 use reprobe::transport::{Sampler, World};
+use reprobe::view::layers::LayerImages;
 use room::Room;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
@@ -296,16 +297,50 @@ fn a_strip_between_lamp_and_floor_casts_a_shadow() {
 fn one_thread_equals_many() {
     let world = lit_room(rough_plastic(0.15));
     let camera = Camera::look_at(Vec3::new(0.8, 1.0, 0.8), Vec3::ZERO, Vec3::Y, 1.2, [24, 16]);
-    let params = PathTraceParams { spp: 4, ..PathTraceParams::default() };
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| path_trace(&world, &camera, &params, 5, 0, &Silent))
+    for spp in [4, 20] {
+        let params = PathTraceParams { spp, ..PathTraceParams::default() };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| path_trace(&world, &camera, &params, 5, 0, &Silent))
+        };
+        let one = with(1);
+        assert!(one == with(7), "{spp} samples");
+        assert!(one != path_trace(&world, &camera, &params, 6, 0, &Silent), "the seed counts");
+        assert!(one != path_trace(&world, &camera, &params, 5, 1, &Silent), "the frame counts");
+        assert!(one.full().iter().all(|c| c.is_finite() && c.min_element() >= 0.0 && *c != Rgb::ZERO));
+    }
+}
+
+#[test]
+fn paths_that_go_by_efficiency_carry_the_same_light() {
+    let world = lit_room(rough_plastic(0.15));
+    let camera = Camera::look_at(Vec3::new(0.8, 1.0, 0.8), Vec3::ZERO, Vec3::Y, 1.2, [24, 16]);
+    let means = |efficiency: bool, pick: fn(&LayerImages) -> &[Rgb]| -> Vec<DVec3> {
+        let params = PathTraceParams { spp: 48, efficiency, ..PathTraceParams::default() };
+        let mean = |image: &[Rgb]| image.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / image.len() as f64;
+        (0..12).map(|seed| mean(pick(&path_trace(&world, &camera, &params, seed, 0, &Silent)))).collect()
     };
-    let one = with(1);
-    assert!(one == with(7));
-    assert!(one != path_trace(&world, &camera, &params, 6, 0, &Silent), "the seed counts");
-    assert!(one != path_trace(&world, &camera, &params, 5, 1, &Silent), "the frame counts");
-    assert!(one.full().iter().all(|c| c.is_finite() && c.min_element() >= 0.0 && *c != Rgb::ZERO));
+    let full = |efficiency: bool| -> Vec<DVec3> {
+        let params = PathTraceParams { spp: 48, efficiency, ..PathTraceParams::default() };
+        let render = |seed| path_trace_full(&world, &camera, &params, seed, 0, &Silent);
+        (0..12).map(|seed| render(seed).iter().map(|c| c.as_dvec3()).sum::<DVec3>() / 384.0).collect()
+    };
+    let spread = |values: &[DVec3]| {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<DVec3>() / n;
+        (mean, values.iter().map(|v| (v - mean) * (v - mean)).sum::<DVec3>() / (n * (n - 1.0)))
+    };
+    for (what, by, without) in [
+        ("diffuse", means(true, |l| &l.diffuse), means(false, |l| &l.diffuse)),
+        ("glossy", means(true, |l| &l.glossy), means(false, |l| &l.glossy)),
+        ("full", full(true), full(false)),
+    ] {
+        assert!(by != without, "{what}: both were made alike");
+        let ((a, noise_a), (b, noise_b)) = (spread(&by), spread(&without));
+        let sigma = (noise_a + noise_b).map(f64::sqrt);
+        assert!((sigma / b).max_element() < 0.004, "{what}: noise {sigma} of {b} hides everything");
+        assert!(((a - b).abs() / sigma).max_element() < 4.0, "{what}: {a} where throughput says {b}, sigma {sigma}");
+    }
 }
 
 #[test]

@@ -69,9 +69,13 @@ fn light_tree_probability(r: Receiver, entry: u32) -> f32 {
     return probability;
 }
 
-// Probability with which each child is chosen; all zero where no light can arrive.
+// Probability with which each child is chosen; all zero where no light can arrive, unless there is one child alone.
 fn light_shares(node: u32, r: Receiver) -> array<f32, 8> {
     var shares: array<f32, 8>;
+    if light_node_f32(node, LIGHT_NODE_POWER + 1u) == 0.0 {
+        shares[0] = 1.0;
+        return shares;
+    }
     var total = 0.0;
     var count = 0.0;
     for (var k = 0u; k < WIDTH; k++) {

@@ -71,8 +71,12 @@ fn sample_environment(index: u32, v: vec2<f32>) -> LightSample {
 fn sample_triangle(t: Near, p: vec3<f32>, probability: f32, v: vec2<f32>) -> LightSample {
     let f = facet(t.triangle);
     let root = sqrt(1.0 - v.x);
-    let b = root * v.y;
-    let c = 1.0 - root;
+    var weights = vec3(root * (1.0 - v.y), root * v.y, 1.0 - root);
+    if t.area < 0.0 {
+        weights = vec3(v.x, 1.0 - v.x - v.y, v.y);
+    }
+    let b = weights.y;
+    let c = weights.z;
     let a = 1.0 - b - c;
     let point = f.corners[0] * a + f.corners[1] * b + f.corners[2] * c;
     let to_light = point - p;
@@ -84,7 +88,7 @@ fn sample_triangle(t: Near, p: vec3<f32>, probability: f32, v: vec2<f32>) -> Lig
         return NO_LIGHT;
     }
     let radiance = texture_eval(emitter_u32(t.emitter, EMITTER_TEXTURE), facet_uv(f, b, c));
-    let pdf = probability * far * far / (t.area * cosine);
+    let pdf = probability * far * far / (abs(t.area) * cosine);
     return LightSample(wi, far, point, radiance / pdf, pdf, false);
 }
 
@@ -100,7 +104,7 @@ fn pdf_surface(r: Receiver, s: Surface) -> f32 {
     if !(cosine > 0.0) {
         return 0.0;
     }
-    return light_share() * light_tree_probability(r, entry) * far * far / (near_at(entry).area * cosine);
+    return light_share() * light_tree_probability(r, entry) * far * far / (abs(near_at(entry).area) * cosine);
 }
 
 fn pdf_environment(d: vec3<f32>) -> f32 {

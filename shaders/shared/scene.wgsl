@@ -100,6 +100,7 @@ const EMITTER_START: u32 = 14u;
 struct Near {
     triangle: u32,
     emitter: u32,
+    // Of the whole, and negative, where the triangle stands for a parallelogram.
     area: f32,
     // Where it hangs in the light tree: eight times the node, plus the slot.
     place: u32,

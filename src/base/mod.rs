@@ -4,5 +4,6 @@ pub mod clock;
 pub mod error;
 pub mod math;
 pub mod named;
+pub mod prefetch;
 pub mod progress;
 pub mod ray;

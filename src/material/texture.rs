@@ -104,6 +104,14 @@ impl Texture {
         }
     }
 
+    /// Tells the caches what [`Texture::at`] will read.
+    #[inline]
+    pub fn prefetch(&self, s: &Surface) {
+        if let Self::Bitmap(bitmap) = self {
+            bitmap.prefetch(s.uv);
+        }
+    }
+
     /// Mean over the texture's own square.
     pub fn mean(&self) -> Rgb {
         match self {
@@ -163,6 +171,16 @@ impl Bitmap {
         let (x, y) = ([column(x), column(x.saturating_add(1))], [row(y), row(y.saturating_add(1))]);
         let across = |y: usize| self.image.pixel(x[0], y) * (1.0 - t.x) + self.image.pixel(x[1], y) * t.x;
         (across(y[0]) * (1.0 - t.y) + across(y[1]) * t.y) * self.scale
+    }
+
+    /// Tells the caches what [`Bitmap::eval`] will read.
+    fn prefetch(&self, uv: Vec2) {
+        let p = self.to_uv.transform_point2(uv) * Vec2::new(self.image.width as f32, self.image.height as f32) - 0.5;
+        let x = self.wrap.index(floor(p.x), self.image.width as i64);
+        let y = floor(p.y);
+        for row in [y, y.saturating_add(1)] {
+            self.image.prefetch(x, self.wrap.index(row, self.image.height as i64));
+        }
     }
 
     /// The pixel at the whole coordinates `p`, which may lie outside; `scale` is not in it.

@@ -99,6 +99,12 @@ impl Envmap {
         ((self.world_from_local * direction_from_lat_long(uv)).normalize_or(Vec3::Y), pdf, self.radiance(&place))
     }
 
+    /// Tells the caches what [`Envmap::sample`] will read of its distribution.
+    pub fn prefetch(&self, v: Vec2) {
+        let (y, _) = self.rows.pick(v.y);
+        self.columns[y].prefetch(v.x);
+    }
+
     /// Cells of the bilinear grid: one a column, and one between each two rows.
     fn cells(&self) -> (usize, usize) {
         (self.image.width, (self.image.height - 1).max(1))

@@ -173,7 +173,7 @@ mod tests {
             let scene = quad(normals, m, flip);
             let x = if m == mirror { -1.0 } else { 1.0 };
             let ray = Ray::new(Vec3::new(0.3 * x, 0.2, 5.0), Vec3::NEG_Z);
-            let hit = Bvh::build(&scene, &|_| true).closest(&scene, &ray).unwrap();
+            let hit = Bvh::build(&scene, &|_| true).closest(&scene, &[], &ray).unwrap();
             let found = surface(&scene, &hit);
             let near = |a: Vec3, b: [f32; 3]| (a - Vec3::from(b)).length() < 1e-5;
             assert!(near(found.frame.n, n) && near(found.frame.s, s) && near(found.frame.t, t), "{:?}", found.frame);
@@ -208,7 +208,7 @@ mod tests {
                 let [u, v] = [2 * i, 2 * i + 1].map(|w| crate::base::math::hash_words(&[w]) as f32 / u32::MAX as f32);
                 let d = crate::base::math::direction_from_lat_long(Vec2::new(u, v));
                 let o = centre - d * (3.0 * radius) + Vec3::new(v, u, 0.5) * radius * 0.3;
-                let Some(hit) = bvh.closest(&scene, &Ray::new(o, d)) else { continue };
+                let Some(hit) = bvh.closest(&scene, &[], &Ray::new(o, d)) else { continue };
                 let s = surface(&scene, &hit);
                 seen += 1;
                 // Outwards, at any angle, nothing more is met; inwards, the far side.
@@ -216,7 +216,7 @@ mod tests {
                 if out.dot(s.ng) > 0.02 {
                     assert!(!bvh.occluded(&scene, &s.spawn(out)), "{s:?}");
                 }
-                let far = bvh.closest(&scene, &s.spawn(d)).unwrap_or_else(|| panic!("no far side of {s:?}"));
+                let far = bvh.closest(&scene, &[], &s.spawn(d)).unwrap_or_else(|| panic!("no far side of {s:?}"));
                 let far = surface(&scene, &far);
                 if d.dot(far.ng) > 0.02 && far.p.distance(s.p) > 0.02 * radius {
                     assert!(!bvh.occluded(&scene, &s.spawn_to(far.p)), "{s:?} to {far:?}");

@@ -8,14 +8,14 @@
 use super::envmap::Envmap;
 use super::light_sample::LightSample;
 use super::light_tree::{LightBounds, LightTree, Receiver};
+use super::light_triangle::{LightTriangle, is_parallelogram};
 use super::round_light;
 use super::sun::Sun;
 use crate::base::math::{Rgb, luminance};
-use crate::material::{Surface, Texture};
-use crate::scene::normals::unit_normal;
-use crate::scene::{Emitter, Geometry, Object, Scene};
+use crate::material::Surface;
+use crate::scene::{Emitter, Scene};
 use glam::{Vec2, Vec3};
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::PI;
 
 /// Sampling distributions of a scene's emitters.
 #[derive(Debug, Default)]
@@ -42,19 +42,6 @@ pub(crate) enum Near {
     Delta(u32),
 }
 
-/// A triangle of an area light, all in one place.
-#[derive(Debug)]
-pub(crate) struct LightTriangle {
-    corners: [Vec3; 3],
-    /// Unit geometric normal, which way it may point; zero for a triangle without area.
-    normal: Vec3,
-    pub(crate) area: f32,
-    /// Index into `Scene::emitters`.
-    pub(crate) emitter: u32,
-    /// Index into `Geometry::triangles`.
-    pub(crate) index: u32,
-}
-
 #[derive(Debug)]
 pub(crate) enum Environment {
     Map(Envmap),
@@ -66,7 +53,7 @@ impl Lights {
     /// Prepares the emitters of a scene.
     pub fn new(scene: &Scene) -> Self {
         let mut this = Self { first: vec![None; scene.emitters.len()], never_met: true, ..Self::default() };
-        let mut bounds = Vec::new();
+        let (mut bounds, mut halves) = (Vec::new(), Vec::new());
         for (i, emitter) in scene.emitters.iter().enumerate() {
             match emitter {
                 Emitter::Area { object, radiance } => {
@@ -80,10 +67,14 @@ impl Lights {
                             this.near.push(Near::Round(round));
                             continue;
                         }
+                        let parallelogram = is_parallelogram(&scene.geometry, object);
                         for t in object.triangles.clone() {
-                            let triangle = LightTriangle::new(&scene.geometry, t, i as u32);
+                            let triangle = LightTriangle::new(&scene.geometry, t, i as u32, parallelogram);
                             bounds.push(triangle.bounds(&scene.geometry, object, mean));
                             this.near.push(Near::Triangle(triangle));
+                        }
+                        if parallelogram {
+                            halves.push(bounds.len() as u32 - 1);
                         }
                     }
                 }
@@ -111,7 +102,7 @@ impl Lights {
                 }
             }
         }
-        this.tree = LightTree::new(&bounds);
+        this.tree = LightTree::new(&bounds, &halves);
         this.never_met &= this.environments.is_empty();
         this
     }
@@ -128,6 +119,14 @@ impl Lights {
 
     fn share(&self) -> f32 {
         1.0 / self.shares().max(1) as f32
+    }
+
+    /// Tells the caches what [`Lights::sample`] will read with the same numbers.
+    #[inline]
+    pub fn prefetch(&self, u: f32, v: Vec2) {
+        if let Some(Environment::Map(map)) = self.environments.get((u * self.shares() as f32) as usize) {
+            map.prefetch(v);
+        }
     }
 
     /// Draws an emitter and a direction to it. `u` chooses the emitter, `v` the point. Visibility is the caller's.
@@ -207,70 +206,6 @@ impl Lights {
             Some(Emitter::Area { radiance, .. }) if s.frame.n.dot(w) > 0.0 => radiance.eval(s.uv),
             _ => Rgb::ZERO,
         }
-    }
-}
-
-impl LightTriangle {
-    fn new(geometry: &Geometry, index: u32, emitter: u32) -> Self {
-        let corners = geometry.corners(index);
-        let normal = unit_normal(corners).unwrap_or(Vec3::ZERO);
-        let area = 0.5 * geometry.area_normal(index).length();
-        Self { corners, normal, area, emitter, index }
-    }
-
-    /// `mean` is the mean luminance of the emitter.
-    fn bounds(&self, geometry: &Geometry, object: &Object, mean: f32) -> LightBounds {
-        let [a, b, c] = self.corners;
-        let normals = if object.face_normals {
-            [self.normal; 3]
-        } else {
-            geometry.triangles[self.index as usize].map(|i| geometry.normals[i as usize])
-        };
-        let axis = normals.iter().sum::<Vec3>().try_normalize();
-        let widest = axis.map_or(PI, |axis| normals.iter().map(|n| axis.angle_between(*n)).fold(0.0, f32::max));
-        // Normals between them lie in the same cone as long as that is narrower than a hemisphere.
-        let spread = if widest < FRAC_PI_2 { widest } else { PI };
-        LightBounds {
-            corners: [a.min(b).min(c), a.max(b).max(c)],
-            axis: axis.unwrap_or(Vec3::Z),
-            spread,
-            reach: FRAC_PI_2,
-            power: if self.normal == Vec3::ZERO { 0.0 } else { mean * self.area },
-        }
-    }
-
-    /// `probability` is that of this triangle's choice.
-    fn sample(&self, scene: &Scene, p: Vec3, probability: f32, v: Vec2) -> Option<LightSample> {
-        let Emitter::Area { object, radiance } = &scene.emitters[self.emitter as usize] else { return None };
-        let root = (1.0 - v.x).sqrt();
-        let [b, c] = [root * v.y, 1.0 - root];
-        let a = 1.0 - b - c;
-        let point = self.corners[0] * a + self.corners[1] * b + self.corners[2] * c;
-        let to_light = point - p;
-        let distance = to_light.length();
-        let wi = to_light.try_normalize()?;
-        let (geometry, object) = (&scene.geometry, &scene.geometry.objects[*object as usize]);
-        let indices = || geometry.triangles[self.index as usize].map(|i| i as usize);
-        let front = if object.face_normals {
-            self.normal
-        } else {
-            let [n0, n1, n2] = indices().map(|i| geometry.normals[i]);
-            n0 * a + n1 * b + n2 * c
-        };
-        let cos = self.normal.dot(wi).abs();
-        if front.dot(wi) >= 0.0 || cos == 0.0 {
-            return None;
-        }
-        let radiance = match radiance {
-            Texture::Constant(radiance) => *radiance,
-            texture if object.has_uvs => {
-                let [t0, t1, t2] = indices().map(|i| geometry.uvs[i]);
-                texture.eval(t0 * a + t1 * b + t2 * c)
-            }
-            texture => texture.eval(Vec2::new(b, c)),
-        };
-        let pdf = probability * distance * distance / (self.area * cos);
-        Some(LightSample { wi, distance, point, weight: radiance / pdf, pdf, delta: false })
     }
 }
 
@@ -363,6 +298,7 @@ fn spot_falloff(cos: f32, cutoff_rad: f32, beam_rad: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::Texture;
     use crate::scene::{Geometry, Object};
     use crate::transport::Sampler;
 
@@ -450,6 +386,39 @@ mod tests {
         assert!((sum / Rgb::new(1.0, 2.0, 3.0) / solid_angle - 1.0).abs().max_element() < 2e-3, "{sum}, {solid_angle} sr");
         let above = Vec3::new(0.0, 3.0, 0.0);
         assert!(lights.sample(&s, &at(above), 0.0, Vec2::splat(0.4)).is_none(), "dark from behind");
+    }
+
+    #[test]
+    fn only_parallelograms_are_sampled_as_one() {
+        const N: u32 = 4096;
+        let skewed = |by: f32, uv: bool| {
+            let mut s = lamp(1.5, vec![]);
+            let mut geometry = (*s.geometry).clone();
+            geometry.positions[3].x += by;
+            geometry.objects[0].has_uvs = uv;
+            geometry.uvs[3] = Vec2::new(0.3, 0.2);
+            s.geometry = geometry.into();
+            s
+        };
+        let p = Vec3::new(0.3, 0.0, -0.2);
+        for (s, one) in [(skewed(0.0, false), true), (skewed(0.5, false), false), (skewed(0.0, true), false)] {
+            let lights = Lights::new(&s);
+            let Near::Triangle(first) = &lights.near[0] else { panic!("a triangle") };
+            assert_eq!((first.parallelogram, lights.tree.place[0] == lights.tree.place[1]), (one, one));
+            // All parts of the lamp are found, at the density of their area.
+            let area = |t| 0.5 * s.geometry.area_normal(t).length();
+            let side = |point: Vec3| point.x * 4.0 > point.z * 2.0;
+            let mut found = [0.0; 2];
+            for i in 0..N {
+                let [u, x, y, _] = Sampler::new(4, i).next_4d();
+                let sample = lights.sample(&s, &at(p), u, Vec2::new(x, y)).unwrap();
+                let per_area = sample.pdf * sample.wi.y / sample.distance.powi(2);
+                found[usize::from(!side(sample.point))] += 1.0 / per_area / N as f32;
+            }
+            for (t, found) in found.iter().enumerate() {
+                assert!((found / area(t as u32) - 1.0).abs() < 0.03, "{one}: triangle {t} has {found} of {}", area(t as u32));
+            }
+        }
     }
 
     #[test]

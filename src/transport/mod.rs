@@ -1,11 +1,13 @@
 //! Light transport: BVH, emitter sampling, the path tracer.
 
 pub mod bvh;
+pub mod efficiency;
 pub mod envmap;
 pub mod facet;
 pub mod follow;
 pub mod light_sample;
 pub mod light_tree;
+mod light_triangle;
 pub mod lights;
 pub mod path;
 mod round_light;

@@ -189,7 +189,7 @@ pub fn dropped_samples() -> u64 {
 
 static DROPPED: AtomicU64 = AtomicU64::new(0);
 
-fn keep_finite(c: Rgb) -> Rgb {
+pub(super) fn keep_finite(c: Rgb) -> Rgb {
     if c.is_finite() {
         return c;
     }
@@ -201,7 +201,7 @@ fn keep_finite(c: Rgb) -> Rgb {
 
 /// What incident radiance is integrated against at a vertex.
 #[derive(Clone, Copy)]
-enum Measure {
+pub(super) enum Measure {
     /// BSDF times cosine, seen from the local direction `wi`.
     Scattering { wi: Vec3, query: Query },
     /// Transmission into the diffuse layer times cosine, on the side of the frame's normal (1) or behind it (-1).
@@ -209,10 +209,10 @@ enum Measure {
 }
 
 /// A point of a path where light arrives.
-struct Vertex<'a> {
-    world: &'a World,
-    surface: &'a Surface,
-    measure: Measure,
+pub(super) struct Vertex<'a> {
+    pub(super) world: &'a World,
+    pub(super) surface: &'a Surface,
+    pub(super) measure: Measure,
 }
 
 /// A ray of a path and how it was found.
@@ -258,6 +258,9 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
     let mut sum = Rgb::ZERO;
     let mut throughput = Rgb::ONE;
     loop {
+        // Drawn before the ray is cast, so that tables can be fetched while it is under way.
+        let [light_x, light_y, light_choice, live] = sampler.next_4d();
+        world.lights.prefetch(light_choice, Vec2::new(light_x, light_y));
         let Some(surface) = world.intersect(&ray) else {
             let light = world.lights.environment(ray.d);
             if light != Rgb::ZERO {
@@ -266,6 +269,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
             }
             return sum;
         };
+        world.prefetch(&surface);
         let wo = -ray.d;
         if surface.emitter.is_some() {
             let light = world.lights.emitted(&world.scene, &surface, wo);
@@ -283,7 +287,6 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
                 return sum;
             }
         }
-        let [light_x, light_y, light_choice, live] = sampler.next_4d();
         let [x, y, lobe, _] = sampler.next_4d();
         let measure = Measure::Scattering { wi: surface.frame.to_local(wo), query };
         let vertex = Vertex { world, surface: &surface, measure };
@@ -311,7 +314,7 @@ impl Vertex<'_> {
     }
 
     /// Where the emitters are seen from.
-    fn receiver(&self) -> Receiver {
+    pub(super) fn receiver(&self) -> Receiver {
         let side = match self.measure {
             Measure::Scattering { .. } if self.bsdf().is_transmissive() => 0.0,
             Measure::Scattering { wi, .. } => 1f32.copysign(wi.z),
@@ -321,7 +324,7 @@ impl Vertex<'_> {
     }
 
     /// Next-event estimation: light straight from an emitter, weighted against finding it by [`Vertex::sample`].
-    fn direct(&self, receiver: &Receiver, choice: f32, v: Vec2) -> Rgb {
+    pub(super) fn direct(&self, receiver: &Receiver, choice: f32, v: Vec2) -> Rgb {
         let world = self.world;
         let Some(light) = world.lights.sample(&world.scene, receiver, choice, v) else { return Rgb::ZERO };
         let wo = self.surface.frame.to_local(light.wi);
@@ -350,7 +353,7 @@ impl Vertex<'_> {
     }
 
     /// Draws a local direction; its weight is the value of [`Vertex::eval_pdf`] over the density.
-    fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
         match self.measure {
             Measure::Scattering { wi, query } => {
                 self.bsdf().sample(self.surface, wi, u, v, query).filter(|s| s.weight != Rgb::ZERO)
@@ -367,7 +370,7 @@ impl Vertex<'_> {
 }
 
 /// Weight of a sample of density `a` where another technique would have found it with density `b`.
-fn power_heuristic(a: f32, b: f32) -> f32 {
+pub(super) fn power_heuristic(a: f32, b: f32) -> f32 {
     let ratio = b / a;
     1.0 / (1.0 + ratio * ratio)
 }

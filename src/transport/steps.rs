@@ -1,13 +1,19 @@
 //! Discrete distributions, sampled by inversion.
 
+use crate::base::prefetch::prefetch_at;
+
 /// Running sums of a discrete distribution, with a table that tells where to begin to look.
 #[derive(Debug, Clone)]
 pub struct Steps {
     /// From 0 to 1; one entry more than there are outcomes.
     pub(crate) sums: Vec<f32>,
-    /// For each of as many equal parts of [0, 1] as there are outcomes: the first step that may hold one of its numbers.
+    /// For each of the equal parts of [0, 1], one for [`PER_PART`] outcomes: the first step that may hold one of its numbers.
     guide: Vec<u32>,
 }
+
+/// Outcomes for which the table has one entry: half a line of the cache of `sums`, which is read anyway; with one entry for each
+/// outcome the tables of an environment's rows drive one another out of the cache.
+const PER_PART: usize = 8;
 
 impl Steps {
     /// The distribution in proportion to `values` (not negative, at least one), and their sum. Even where that is zero.
@@ -29,10 +35,11 @@ impl Steps {
             })
             .collect();
         let mut step = 0;
-        let guide = (0..last)
+        let parts = last.div_ceil(PER_PART);
+        let guide = (0..parts)
             .map(|part| {
-                // One part early, against rounding.
-                let low = (part.max(1) - 1) as f32 / last as f32;
+                // A little early, against rounding.
+                let low = (part as f32 / parts as f32) * (1.0 - 4.0 * f32::EPSILON);
                 while step + 1 < last && sums[step + 1] <= low {
                     step += 1;
                 }
@@ -42,11 +49,21 @@ impl Steps {
         (Self { sums, guide }, total)
     }
 
+    /// A step at or before the one that `u` falls on.
+    fn start(&self, u: f32) -> usize {
+        let parts = self.guide.len();
+        self.guide[((u * parts as f32) as usize).min(parts - 1)] as usize
+    }
+
+    /// Tells the caches what [`Steps::pick`] will read.
+    pub fn prefetch(&self, u: f32) {
+        prefetch_at(&self.sums, self.start(u));
+    }
+
     /// The outcome that `u` in [0, 1) falls on, and where in its step, in [0, 1).
     pub fn pick(&self, u: f32) -> (usize, f32) {
-        let last = self.guide.len();
-        let part = ((u * last as f32) as usize).min(last - 1);
-        let mut step = self.guide[part] as usize;
+        let last = self.sums.len() - 1;
+        let mut step = self.start(u);
         while step + 1 < last && self.sums[step + 1] <= u {
             step += 1;
         }

@@ -72,7 +72,7 @@ impl World {
     /// First hit of a ray.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let own = self.bvh.closest(&self.scene, ray);
+        let own = self.bvh.closest(&self.scene, &self.facets, ray);
         match &self.added {
             None => own,
             Some(added) => added.closest(&self.scene, ray, own),
@@ -83,6 +83,12 @@ impl World {
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Surface> {
         self.closest(ray).map(|hit| self.surface(&hit))
+    }
+
+    /// Tells the caches what the scattering model at a surface will read.
+    #[inline]
+    pub fn prefetch(&self, surface: &Surface) {
+        self.scene.materials[surface.material as usize].bsdf.prefetch(surface);
     }
 
     /// The surface that a camera's ray shows: where the scene hides its emitters, the first that is none.
@@ -153,7 +159,7 @@ impl Added {
     /// The closer of `own`, the scene's hit, and one of these triangles; at the same distance `own`, which has the lower index.
     fn closest(&self, scene: &Scene, ray: &Ray, own: Option<Hit>) -> Option<Hit> {
         let nearer = Ray { t_max: own.map_or(ray.t_max, |hit| hit.t), ..*ray };
-        let found = self.bvh.closest(scene, &nearer);
+        let found = self.bvh.closest(scene, &[], &nearer);
         match (&found, own) {
             (Some(hit), Some(other)) if hit.t >= other.t => own,
             (None, _) => own,

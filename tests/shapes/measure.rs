@@ -71,7 +71,8 @@ pub fn expect_quarters(inside: &str, spp: u32, filter: Filter, mitsuba: [[f64; 3
     let world = World::new(scene(inside));
     let camera = world.scene.sensor.clone().unwrap();
     let [width, height] = camera.size.map(|s| s as usize);
-    let params = PathTraceParams { spp: spp.div_ceil(SEEDS), path: PathParams::of(&world.scene), filter };
+    let params =
+        PathTraceParams { spp: spp.div_ceil(SEEDS), path: PathParams::of(&world.scene), filter, ..PathTraceParams::default() };
     let quarters = |pixels: &[glam::Vec3]| {
         let mut sums = [(DVec3::ZERO, 0.0); 4];
         for (i, p) in pixels.iter().enumerate() {
@@ -93,7 +94,7 @@ pub fn expect_quarters(inside: &str, spp: u32, filter: Filter, mitsuba: [[f64; 3
 /// The layers' sum has the mean of the full image: both ways of rendering see the scene alike.
 fn layers_add_up(world: &World, filter: Filter, renders: &[[DVec3; 4]]) {
     let camera = world.scene.sensor.clone().unwrap();
-    let params = PathTraceParams { spp: 16, path: PathParams::of(&world.scene), filter };
+    let params = PathTraceParams { spp: 16, path: PathParams::of(&world.scene), filter, ..PathTraceParams::default() };
     let full: Vec<f64> = renders.iter().map(|r| r.iter().sum::<DVec3>().element_sum()).collect();
     let sums: Vec<f64> = (0..SEEDS)
         .map(|seed| {

@@ -112,7 +112,10 @@ pub(crate) fn near(world: &World) -> Vec<GpuNear> {
     let of = |(near, [node, slot]): (&Near, &[u32; 2])| {
         let place = node * WIDTH as u32 + slot;
         match near {
-            Near::Triangle(t) => GpuNear { triangle: t.index, emitter: t.emitter, area: t.area, place },
+            Near::Triangle(t) => {
+                let area = if t.parallelogram { -t.area } else { t.area };
+                GpuNear { triangle: t.index, emitter: t.emitter, area, place }
+            }
             // Refused before it comes here.
             Near::Round(_) => GpuNear { triangle: NONE, emitter: NONE, area: 0.0, place },
             Near::Delta(emitter) => GpuNear { triangle: NONE, emitter: *emitter, area: 0.0, place },

@@ -30,6 +30,10 @@ impl Scatter for Diffuse {
         BsdfSample::reflected(wo, self.reflectance.at(s), cosine_hemisphere_pdf(wo))
     }
 
+    fn prefetch(&self, s: &Surface) {
+        self.reflectance.prefetch(s);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes::DIFFUSE
     }

@@ -121,6 +121,8 @@ trait Scatter {
         None
     }
 
+    fn prefetch(&self, _s: &Surface) {}
+
     fn is_transmissive(&self) -> bool {
         false
     }
@@ -261,6 +263,12 @@ impl Bsdf {
     /// anisotropic pair, the smaller of a blend; `None` without such a lobe.
     pub fn alpha(&self, s: &Surface) -> Option<f32> {
         each!(self, model => model.alpha(s))
+    }
+
+    /// Tells the caches what the model will read of its textures at a point, as far as it is worth it.
+    #[inline]
+    pub fn prefetch(&self, s: &Surface) {
+        each!(self, model => model.prefetch(s))
     }
 
     /// Whether the back side scatters like the front (`twosided`).

@@ -113,6 +113,10 @@ impl Scatter for RoughPlastic {
         BsdfSample::reflected(wo, value / pdf, pdf)
     }
 
+    fn prefetch(&self, s: &Surface) {
+        self.params.diffuse_reflectance.prefetch(s);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes::ALL
     }

@@ -44,6 +44,10 @@ impl Scatter for TwoSided {
         Some(BsdfSample { wo: towards(wi, sample.wo), ..sample })
     }
 
+    fn prefetch(&self, s: &Surface) {
+        self.front.prefetch(s);
+    }
+
     fn lobes(&self) -> Lobes {
         self.front.lobes() | self.back.lobes()
     }

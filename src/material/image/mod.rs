@@ -3,6 +3,7 @@
 mod file;
 
 use crate::base::math::Rgb;
+use crate::base::prefetch::prefetch_at;
 
 pub use file::{ReadOptions, Take, decode, read};
 
@@ -88,6 +89,16 @@ impl Image {
     #[inline]
     pub fn pixel(&self, x: usize, y: usize) -> Rgb {
         self.at(y * self.width + x)
+    }
+
+    /// Tells the caches that [`Image::pixel`] will be read.
+    #[inline]
+    pub fn prefetch(&self, x: usize, y: usize) {
+        let i = y * self.width + x;
+        match &self.pixels {
+            Pixels::Float(pixels) => prefetch_at(pixels, i),
+            Pixels::Bytes { rgb, .. } => prefetch_at(rgb, 3 * i),
+        }
     }
 
     #[inline]

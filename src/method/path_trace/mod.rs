@@ -1,11 +1,12 @@
 //! Path-traced frames: emission, diffuse and glossy layers in one pass, or the full image by one path a sample.
 //!
 //! With a box filter, each pixel is the mean of samples spread over its own square (Owen-scrambled Sobol); with another
-//! ([`crate::scene::film`]), over all that the filter reaches.
+//! ([`crate::scene::film`]), over all that the filter reaches. Frames of many samples go by efficiency: `passes.rs`.
 //! In: world, camera. Out: linear radiance a layer; their sum is the full image.
 
 pub mod denoise_gpu;
 pub mod gpu;
+mod passes;
 mod row;
 
 pub use row::METHOD;
@@ -33,6 +34,10 @@ pub struct PathTraceParams {
     /// Reconstruction filter, the same for all layers.
     #[serde(default, skip_serializing_if = "is_box")]
     pub filter: Filter,
+    /// Whether paths end and branch by what that does for the image ([`crate::transport::efficiency`]), from 16 samples a pixel on; by their
+    /// throughput otherwise, as always on a GPU.
+    #[serde(default)]
+    pub efficiency: bool,
 }
 
 fn is_box(filter: &Filter) -> bool {
@@ -41,7 +46,7 @@ fn is_box(filter: &Filter) -> bool {
 
 impl Default for PathTraceParams {
     fn default() -> Self {
-        Self { spp: 64, path: PathParams::default(), filter: Filter::Box }
+        Self { spp: 64, path: PathParams::default(), filter: Filter::Box, efficiency: true }
     }
 }
 
@@ -54,8 +59,14 @@ pub fn path_trace_full(
     frame: u32,
     progress: &dyn Progress,
 ) -> Vec<Rgb> {
-    let sample = |ray: &Ray, sampler: &mut Sampler| [radiance(world, ray, &params.path, sampler)];
-    image(camera, params, seed, frame, &sample, progress).into_iter().map(|[full]| full).collect()
+    let samples = Samples::new(camera, params, seed, frame);
+    // What `radiance` does for glass before hidden emitters has no place in the passes.
+    let pixels = if params.in_passes() && !world.scene.hide_emitters {
+        passes::image(world, &samples, params, &passes::full, progress)
+    } else {
+        samples.means(params.spp, &|ray, sampler| [radiance(world, ray, &params.path, sampler)], progress)
+    };
+    pixels.into_iter().map(|[full]| full).collect()
 }
 
 /// Renders frame number `frame` of a path from `camera`. Advances `progress` by one a row; start and finish are the caller's.
@@ -67,52 +78,80 @@ pub fn path_trace(
     frame: u32,
     progress: &dyn Progress,
 ) -> LayerImages {
+    let samples = Samples::new(camera, params, seed, frame);
     let sample = |ray: &Ray, sampler: &mut Sampler| {
         let Layers { emission, diffuse, glossy } = trace_layers(world, ray, &params.path, sampler);
         [emission, diffuse, glossy]
     };
-    let pixels = image(camera, params, seed, frame, &sample, progress);
+    let pixels = if params.in_passes() {
+        passes::image(world, &samples, params, &passes::layers, progress)
+    } else {
+        samples.means(params.spp, &sample, progress)
+    };
     let layer = |k: usize| pixels.iter().map(|p| p[k]).collect();
     LayerImages { emission: layer(0), diffuse: layer(1), glossy: layer(2) }
 }
 
-/// Means of `N` quantities over the samples of every pixel.
-fn image<const N: usize>(
-    camera: &Camera,
-    params: &PathTraceParams,
+impl PathTraceParams {
+    /// Whether there is anything to learn, and the samples to learn it from.
+    fn in_passes(&self) -> bool {
+        self.efficiency && self.spp >= passes::FEWEST && self.path.max_depth > 1
+    }
+}
+
+/// The samples of a frame's pixels.
+struct Samples<'a> {
+    camera: &'a Camera,
+    /// Across and down; `None` for a box.
+    filter: Option<[FilterSamples; 2]>,
     seed: u32,
     frame: u32,
-    sample: &(dyn Fn(&Ray, &mut Sampler) -> [Rgb; N] + Sync),
-    progress: &dyn Progress,
-) -> Vec<[Rgb; N]> {
-    let [width, height] = camera.size;
-    let spp = params.spp;
-    let filter = (params.filter != Filter::Box).then(|| camera.size.map(|side| FilterSamples::new(params.filter, side)));
-    let pixel = |x: u32, y: u32| {
-        let stream = hash_words(&[seed, frame, y * width + x]);
-        let corner = Vec2::new(x as f32, y as f32);
-        let mut sums = [DVec3::ZERO; N];
-        for index in 0..spp {
-            let mut sampler = Sampler::new(stream, index);
-            let [dx, dy, lens_x, lens_y] = sampler.next_4d();
-            let (at, weight) = match &filter {
-                None => (corner + Vec2::new(dx, dy), 1.0),
-                Some([across, down]) => {
-                    let ((at_x, weight_x), (at_y, weight_y)) = (across.sample(x, dx), down.sample(y, dy));
-                    (Vec2::new(at_x, at_y), weight_x * weight_y)
-                }
-            };
-            let ray = camera.ray(at, Vec2::new(lens_x, lens_y));
-            for (sum, value) in sums.iter_mut().zip(sample(&ray, &mut sampler)) {
-                *sum += (value * weight).as_dvec3();
+}
+
+impl<'a> Samples<'a> {
+    fn new(camera: &'a Camera, params: &PathTraceParams, seed: u32, frame: u32) -> Self {
+        let of = |filter| camera.size.map(|side| FilterSamples::new(filter, side));
+        Self { camera, filter: (params.filter != Filter::Box).then(|| of(params.filter)), seed, frame }
+    }
+
+    /// The ray of sample `index` of a pixel, its weight, and the numbers that are left to it.
+    fn at(&self, x: u32, y: u32, index: u32) -> (Ray, f32, Sampler) {
+        let stream = hash_words(&[self.seed, self.frame, y * self.camera.size[0] + x]);
+        let mut sampler = Sampler::new(stream, index);
+        let [dx, dy, lens_x, lens_y] = sampler.next_4d();
+        let (at, weight) = match &self.filter {
+            None => (Vec2::new(x as f32 + dx, y as f32 + dy), 1.0),
+            Some([across, down]) => {
+                let ((at_x, weight_x), (at_y, weight_y)) = (across.sample(x, dx), down.sample(y, dy));
+                (Vec2::new(at_x, at_y), weight_x * weight_y)
             }
-        }
-        sums.map(|s| (s / f64::from(spp.max(1))).as_vec3())
-    };
-    let row = |y: u32| -> Vec<[Rgb; N]> {
-        let pixels = (0..width).map(|x| pixel(x, y)).collect();
-        progress.advance(1);
-        pixels
-    };
-    (0..height).into_par_iter().map(row).collect::<Vec<_>>().concat()
+        };
+        (self.camera.ray(at, Vec2::new(lens_x, lens_y)), weight, sampler)
+    }
+
+    /// Means of `N` quantities over the samples of every pixel.
+    fn means<const N: usize>(
+        &self,
+        spp: u32,
+        sample: &(dyn Fn(&Ray, &mut Sampler) -> [Rgb; N] + Sync),
+        progress: &dyn Progress,
+    ) -> Vec<[Rgb; N]> {
+        let [width, height] = self.camera.size;
+        let pixel = |x: u32, y: u32| {
+            let mut sums = [DVec3::ZERO; N];
+            for index in 0..spp {
+                let (ray, weight, mut sampler) = self.at(x, y, index);
+                for (sum, value) in sums.iter_mut().zip(sample(&ray, &mut sampler)) {
+                    *sum += (value * weight).as_dvec3();
+                }
+            }
+            sums.map(|s| (s / f64::from(spp.max(1))).as_vec3())
+        };
+        let row = |y: u32| -> Vec<[Rgb; N]> {
+            let pixels = (0..width).map(|x| pixel(x, y)).collect();
+            progress.advance(1);
+            pixels
+        };
+        (0..height).into_par_iter().map(row).collect::<Vec<_>>().concat()
+    }
 }

@@ -4,7 +4,7 @@ use super::denoise_gpu::Denoiser as OnDevice;
 use super::gpu::PathTracer;
 use super::{PathTraceParams, path_trace, path_trace_full};
 use crate::base::clock::Clock;
-use crate::base::named::{Parameters, tree, within};
+use crate::base::named::{Parameters, apply, tree, within};
 use crate::base::progress::Progress;
 use crate::gpu::{Gpu, GpuScene};
 use crate::method::{FilterChoice, ForScene, Frame, LayerChoice, Method, Options, Picture, Reads, Renderer, Samples, Setup};
@@ -55,16 +55,17 @@ struct Params {
 }
 
 fn parameters(options: &Options) -> Result<Value> {
-    if options.denoise.is_none() && !options.set.is_empty() {
-        return Err(Error::Request("--set: of path-trace, the denoiser alone has parameters; give --denoise too".into()));
+    let (own, of_denoiser): (Vec<_>, Vec<_>) = options.set.iter().cloned().partition(|set| set.starts_with("efficiency="));
+    if options.denoise.is_none() && !of_denoiser.is_empty() {
+        let why = "--set: of path-trace, efficiency and the denoiser's parameters can be set; give --denoise for the latter";
+        return Err(Error::Request(why.into()));
     }
     if options.denoise.is_some() && options.layers == Some(LayerChoice::Full) {
         return Err(Error::Request("--denoise works layer by layer: leave --layers full out".into()));
     }
     let base = PathTraceParams::default();
-    let path_trace = PathTraceParams { spp: options.spp.unwrap_or(base.spp), ..base };
-    path_trace.validate()?;
-    let denoise = options.denoise.map(|wanted| Denoiser::choose(wanted, &options.set)).transpose()?;
+    let path_trace = apply(&PathTraceParams { spp: options.spp.unwrap_or(base.spp), ..base }, &own)?;
+    let denoise = options.denoise.map(|wanted| Denoiser::choose(wanted, &of_denoiser)).transpose()?;
     let Options { layers, max_depth, rfilter, .. } = *options;
     tree(&Params { path_trace, layers: layers.unwrap_or_default(), max_depth, rfilter, denoise })
 }

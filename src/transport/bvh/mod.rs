@@ -16,7 +16,7 @@ mod traverse;
 mod triangle;
 mod wide;
 
-use super::facet::uv_at;
+use super::facet::{Facet, uv_at};
 use crate::base::math::{hash_words, unit};
 use crate::base::ray::{Hit, Ray};
 use crate::scene::normals::unit_normal;
@@ -89,26 +89,27 @@ impl Bvh {
         }
     }
 
-    /// First hit in [t_min, t_max]. Alpha-masked triangles are passed where a hash of ray and triangle says so.
+    /// First hit in [t_min, t_max]. Alpha-masked triangles are passed where a hash of ray and triangle says so. `facets`, of the scene's
+    /// triangles from 0 on, are fetched into the cache while the ray is still under way; there may be none.
     #[inline]
-    pub fn closest(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
-        let flat = self.closest_triangle(scene, ray);
+    pub fn closest(&self, scene: &Scene, facets: &[Facet], ray: &Ray) -> Option<Hit> {
+        let flat = self.closest_triangle(scene, facets, ray);
         match &self.rounds {
             Some(rounds) => rounds.closest(scene, ray, flat, &mut |hit| passes(scene, ray, hit)),
             None => flat,
         }
     }
 
-    fn closest_triangle(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
+    fn closest_triangle(&self, scene: &Scene, facets: &[Facet], ray: &Ray) -> Option<Hit> {
         let passes = &mut |hit: &Hit| passes(scene, ray, hit);
         #[cfg(target_arch = "x86_64")]
         match self.lanes {
             // SAFETY: the machine has what the value stands for.
-            Lanes::Avx512(s) => return unsafe { closest_avx512(s, &self.tree, ray, passes) },
-            Lanes::Avx2(s) => return unsafe { closest_avx2(s, &self.tree, ray, passes) },
+            Lanes::Avx512(s) => return unsafe { closest_avx512(s, &self.tree, facets, ray, passes) },
+            Lanes::Avx2(s) => return unsafe { closest_avx2(s, &self.tree, facets, ray, passes) },
             Lanes::Portable => {}
         }
-        closest_with(Portable, &self.tree, ray, passes)
+        closest_with(Portable, &self.tree, facets, ray, passes)
     }
 
     /// Whether anything lies in [t_min, t_max].
@@ -184,11 +185,11 @@ thread_local! {
 }
 
 #[inline(always)]
-fn closest_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
+fn closest_with<S: Simd>(s: S, tree: &Tree, facets: &[Facet], ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
     if tree.stack <= STACK {
-        STACKS.with_borrow_mut(|(entries, ids)| traverse::closest(s, tree, ray, (entries, ids), passes))
+        STACKS.with_borrow_mut(|(entries, ids)| traverse::closest(s, tree, facets, ray, (entries, ids), passes))
     } else {
-        traverse::closest(s, tree, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
+        traverse::closest(s, tree, facets, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
     }
 }
 
@@ -203,8 +204,8 @@ fn any_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) 
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn closest_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    closest_with(s, tree, ray, passes)
+fn closest_avx2(s: Avx2, tree: &Tree, facets: &[Facet], ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
+    closest_with(s, tree, facets, ray, passes)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -215,8 +216,8 @@ fn any_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> boo
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn closest_avx512(s: Avx512, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    closest_with(s, tree, ray, passes)
+fn closest_avx512(s: Avx512, tree: &Tree, facets: &[Facet], ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
+    closest_with(s, tree, facets, ray, passes)
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -65,8 +65,6 @@ pub trait Simd: Copy {
     fn pack_ids(self, a: Self::I, mask: u32) -> Self::I;
     /// As `le`, of both operands in the order `by`.
     fn le_permuted(self, a: Self::F, b: Self::F, by: Self::I) -> u32;
-    /// Tells the caches that `item` will be wanted soon.
-    fn prefetch<T>(self, _item: &T) {}
 }
 
 /// Plain arrays.
@@ -265,14 +263,6 @@ mod x86 {
             #[inline(always)]
             fn permute_ids(self, a: __m256i, by: __m256i) -> __m256i {
                 unsafe { _mm256_permutevar8x32_epi32(a, by) }
-            }
-            #[inline(always)]
-            fn prefetch<T>(self, item: &T) {
-                for offset in (0..size_of::<T>()).step_by(64) {
-                    let line = std::ptr::from_ref(item).cast::<i8>().wrapping_add(offset);
-                    // A hint: it reads nothing, whatever the address.
-                    unsafe { _mm_prefetch::<_MM_HINT_T0>(line) }
-                }
             }
         };
     }

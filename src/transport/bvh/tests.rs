@@ -106,7 +106,7 @@ fn hits_are_those_of_brute_force() {
         for i in 0..6000 {
             let ray = ray_of(i, &scene.geometry, scale, &mut random);
             let expected = brute_force(&scene.geometry, &ray);
-            assert_eq!(bvh.closest(&scene, &ray), expected, "ray {i} {ray:?} at scale {scale}");
+            assert_eq!(bvh.closest(&scene, &[], &ray), expected, "ray {i} {ray:?} at scale {scale}");
             assert_eq!(bvh.occluded(&scene, &ray), expected.is_some(), "ray {i} {ray:?}");
             hits += u32::from(expected.is_some());
             ties += u32::from(expected.is_some_and(|h| h.triangle > 0 && h.u * h.v * (1.0 - h.u - h.v) == 0.0));
@@ -124,7 +124,7 @@ fn only_kept_triangles_are_hit() {
     odd.triangles.iter_mut().skip(1).step_by(2).for_each(|t| *t = [0; 3]);
     for i in 0..2000 {
         let ray = ray_of(i, &scene.geometry, 1.0, &mut random);
-        assert_eq!(bvh.closest(&scene, &ray), brute_force(&odd, &ray));
+        assert_eq!(bvh.closest(&scene, &[], &ray), brute_force(&odd, &ray));
     }
 }
 
@@ -133,12 +133,12 @@ fn nothing_and_one_triangle() {
     let empty = Scene::default();
     let bvh = Bvh::build(&empty, &|_| true);
     let ray = Ray::new(Vec3::Z, Vec3::NEG_Z);
-    assert_eq!(bvh.closest(&empty, &ray), None);
+    assert_eq!(bvh.closest(&empty, &[], &ray), None);
     assert!(!bvh.occluded(&empty, &ray));
     let scene = scene_of(primitives::rectangle(), Mat4::IDENTITY);
     let bvh = Bvh::build(&scene, &|t| t == 1);
-    assert_eq!(bvh.closest(&scene, &Ray::new(Vec3::new(-0.5, 0.2, 1.0), Vec3::NEG_Z)).map(|h| h.t), Some(1.0));
-    assert_eq!(bvh.closest(&scene, &Ray::new(Vec3::new(0.5, -0.2, 1.0), Vec3::NEG_Z)), None);
+    assert_eq!(bvh.closest(&scene, &[], &Ray::new(Vec3::new(-0.5, 0.2, 1.0), Vec3::NEG_Z)).map(|h| h.t), Some(1.0));
+    assert_eq!(bvh.closest(&scene, &[], &Ray::new(Vec3::new(0.5, -0.2, 1.0), Vec3::NEG_Z)), None);
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn closed_meshes_do_not_leak() {
                 1 => (b.lerp(c, random.next()) - o).normalize(),
                 _ => random.direction(),
             };
-            assert!(bvh.closest(&scene, &Ray::new(o, d)).is_some(), "ray {i} {o} {d}");
+            assert!(bvh.closest(&scene, &[], &Ray::new(o, d)).is_some(), "ray {i} {o} {d}");
         }
     }
 }
@@ -185,11 +185,11 @@ fn masks_let_through_what_their_opacity_says() {
         for _ in 0..count {
             let d = (random.point() * Vec3::new(0.2, 0.2, 0.0) + Vec3::NEG_Z).normalize();
             let ray = Ray::new(Vec3::new(random.next() * 0.5, random.next() * 0.5, 1.0), d);
-            let hit = bvh.closest(&scene, &ray).expect("the back is opaque");
+            let hit = bvh.closest(&scene, &[], &ray).expect("the back is opaque");
             stopped += u32::from(hit.t < 1.5);
             let shorter = Ray { t_max: 1.5, ..ray };
             assert_eq!(bvh.occluded(&scene, &shorter), hit.t < 1.5);
-            assert_eq!(bvh.closest(&scene, &shorter).is_some(), hit.t < 1.5);
+            assert_eq!(bvh.closest(&scene, &[], &shorter).is_some(), hit.t < 1.5);
         }
         let mean = stopped as f32 / count as f32;
         let sigma = (opacity * (1.0 - opacity) / count as f32).sqrt();
@@ -248,18 +248,19 @@ fn all_forms_answer_bit_for_bit() {
         // A mask that waves through every third triangle, to see that both are asked about the same ones.
         let pass = |hit: &Hit| hit.triangle.is_multiple_of(3);
         let bits = |h: Option<Hit>| h.map(|h| (h.t.to_bits(), h.triangle, h.u.to_bits(), h.v.to_bits()));
-        let a = closest_with(Portable, &bvh.tree, &ray, &mut |h| pass(h));
+        let a = closest_with(Portable, &bvh.tree, &[], &ray, &mut |h| pass(h));
         let any = any_with(Portable, &bvh.tree, &ray, &mut |h| pass(h));
         if let Some(s) = avx2 {
             // SAFETY: it was detected.
-            let (b, any_b) =
-                unsafe { (closest_avx2(s, &bvh.tree, &ray, &mut |h| pass(h)), any_avx2(s, &bvh.tree, &ray, &mut |h| pass(h))) };
+            let (b, any_b) = unsafe {
+                (closest_avx2(s, &bvh.tree, &[], &ray, &mut |h| pass(h)), any_avx2(s, &bvh.tree, &ray, &mut |h| pass(h)))
+            };
             assert_eq!((bits(a), any), (bits(b), any_b), "AVX2, ray {i}");
         }
         if let Some(s) = avx512 {
             // SAFETY: it was detected.
             let (b, any_b) = unsafe {
-                (closest_avx512(s, &bvh.tree, &ray, &mut |h| pass(h)), any_avx512(s, &bvh.tree, &ray, &mut |h| pass(h)))
+                (closest_avx512(s, &bvh.tree, &[], &ray, &mut |h| pass(h)), any_avx512(s, &bvh.tree, &ray, &mut |h| pass(h)))
             };
             assert_eq!((bits(a), any), (bits(b), any_b), "AVX-512, ray {i}");
         }
@@ -285,10 +286,10 @@ fn deep_trees_fit_their_stack() {
         let o = (random.point() + 1.0) * 1.1f32.powf(random.next() * 120.0);
         let ray = Ray::new(o, random.direction());
         let expected = brute_force(&scene.geometry, &ray);
-        assert_eq!(bvh.closest(&scene, &ray), expected);
+        assert_eq!(bvh.closest(&scene, &[], &ray), expected);
         // The same on a stack from the heap, as trees too deep for the other get.
         let needed = std::mem::replace(&mut bvh.tree.stack, STACK + 1);
-        assert_eq!(bvh.closest(&scene, &ray), expected);
+        assert_eq!(bvh.closest(&scene, &[], &ray), expected);
         assert_eq!(bvh.occluded(&scene, &ray), expected.is_some());
         bvh.tree.stack = needed;
     }

@@ -3,7 +3,8 @@
 use super::simd::Simd;
 use super::triangle::Shear;
 use super::wide::{Block, MARK, Node, Tree};
-use super::{Hit, Ray};
+use super::{Facet, Hit, Ray};
+use crate::base::prefetch::{prefetch, prefetch_at};
 
 /// Distances to the far sides of boxes grow by this much against rounding: 4 ulp, where the slab test can lose 3 (compare Ize 2013).
 const FAR_SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
@@ -101,11 +102,13 @@ impl<S: Simd> Prepared<S> {
     }
 }
 
-/// The closest hit that `passes` does not wave through. Of two at one distance, the lower index wins.
+/// The closest hit that `passes` does not wave through. Of two at one distance, the lower index wins. `facets` will be asked for that
+/// of the hit.
 #[inline(always)]
 pub fn closest<S: Simd>(
     s: S,
     tree: &Tree,
+    facets: &[Facet],
     ray: &Ray,
     stack: (&mut [f32], &mut [u32]),
     passes: &mut dyn FnMut(&Hit) -> bool,
@@ -133,7 +136,7 @@ pub fn closest<S: Simd>(
             s.store(enter, entries[top..].first_chunk_mut().expect("room for eight"));
             s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
             let end = top + mask.count_ones() as usize;
-            prefetch(s, tree, &ids[top..end]);
+            prefetch_all(tree, &ids[top..end]);
             top = end;
         } else {
             let block = &tree.blocks[(id & !MARK) as usize];
@@ -150,6 +153,7 @@ pub fn closest<S: Simd>(
                 if wins && !(block.ids[lane] & MARK != 0 && passes(&hit)) {
                     nearest = hit.t;
                     best = Some(hit);
+                    prefetch_at(facets, hit.triangle as usize);
                 }
             }
         }
@@ -176,7 +180,7 @@ pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut 
             let children = s.pack_ids(s.permute_ids(s.load_ids(&node.children), r.order), mask);
             s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
             let end = top + mask.count_ones() as usize;
-            prefetch(s, tree, &ids[top..end]);
+            prefetch_all(tree, &ids[top..end]);
             top = end;
         } else {
             let block = &tree.blocks[(id & !MARK) as usize];
@@ -201,12 +205,12 @@ pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut 
 /// Nearly all of what is put on the stack is visited, so its fetching can begin. Waiting for memory is most of the time of
 /// rays without order in a large scene.
 #[inline(always)]
-fn prefetch<S: Simd>(s: S, tree: &Tree, ids: &[u32]) {
+fn prefetch_all(tree: &Tree, ids: &[u32]) {
     for &id in ids {
         if id & MARK == 0 {
-            s.prefetch(&tree.nodes[id as usize]);
+            prefetch(&tree.nodes[id as usize]);
         } else {
-            s.prefetch(&tree.blocks[(id & !MARK) as usize]);
+            prefetch(&tree.blocks[(id & !MARK) as usize]);
         }
     }
 }

@@ -1,0 +1,216 @@
+//! Paths that branch: one estimate of scattered radiance is a tree of vertices.
+
+use super::moments::{Kind, Moments, Tally};
+use crate::base::math::Rgb;
+use crate::base::ray::Ray;
+use crate::material::Surface;
+use crate::material::bsdf::{Lobes, Query};
+use crate::transport::light_tree::Receiver;
+use crate::transport::path::{Measure, PathParams, ROULETTE_CAP, ROULETTE_MERCY, Vertex, keep_finite, power_heuristic};
+use crate::transport::{Sampler, World};
+use glam::{Vec2, Vec3};
+
+/// Fewest and most estimates of a kind at a vertex, on average. Where a cell is wrong about a place, the least keeps the variance bounded.
+const ESTIMATES: [f32; 2] = [0.05, 4.0];
+
+/// Vertices after which paths thin out, whatever they bring: trees must end.
+const DEEP: u32 = 64;
+
+/// What continuations of a path's vertices go by.
+#[derive(Debug)]
+pub struct Plan {
+    /// What estimates are like.
+    pub moments: Moments,
+    /// sqrt(C / V): cost and mean relative variance of one sample of a pixel.
+    pub efficiency: f32,
+}
+
+/// Radiance, and what it took to estimate it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Estimate {
+    /// Radiance.
+    pub light: Rgb,
+    /// In the unit of [`RAY_COST`].
+    pub cost: f32,
+}
+
+impl Estimate {
+    fn add(&mut self, other: Self, weight: Rgb) {
+        self.light += weight * other.light;
+        self.cost += other.cost;
+    }
+}
+
+/// Cost of a ray with the surface that it meets; of the camera's, too. Costs are in any unit that all share: profiles of five scenes
+/// have these ratios.
+pub const RAY_COST: f32 = 1.2;
+
+/// Cost of an emitter sample with its shadow ray.
+const DIRECT_COST: f32 = 0.8;
+
+/// Cost of a direction that was drawn, and not followed.
+const DRAW_COST: f32 = 0.2;
+
+/// Follows paths, by a plan or, where there is none yet, by [`PathParams`]'s roulette.
+pub struct Walk<'a> {
+    /// Where they go.
+    pub world: &'a World,
+    /// Depth, and roulette without a plan.
+    pub params: &'a PathParams,
+    /// Of image and scene.
+    pub plan: Option<&'a Plan>,
+    /// Takes in every estimate on the way.
+    pub tally: Option<Tally>,
+}
+
+/// What a path has become when it reaches a vertex.
+#[derive(Debug, Clone, Copy)]
+pub struct Start {
+    /// What radiance there is multiplied with on its way to the pixel, over the pixel's own radiance. Without a plan: on its way alone.
+    pub weight: Rgb,
+    /// Relative index of refraction so far.
+    pub eta: f32,
+    /// Vertices before it.
+    pub depth: u32,
+}
+
+/// A vertex that a path has reached.
+struct Reached<'a> {
+    s: &'a Surface,
+    query: Query,
+    start: Start,
+    /// As cells ask for it.
+    direction: Option<Vec3>,
+}
+
+impl Walk<'_> {
+    /// One estimate of the radiance that `s` scatters to `wo` by the lobes of `query`.
+    pub fn scattered(&mut self, s: &Surface, wo: Vec3, query: Query, start: Start, sampler: &mut Sampler) -> Estimate {
+        let numbers = sampler.next_4d();
+        self.scattered_with(numbers, s, wo, query, start, sampler)
+    }
+
+    /// [`Walk::scattered`] whose numbers for the emitter have been drawn.
+    fn scattered_with(
+        &mut self,
+        mut numbers: [f32; 4],
+        s: &Surface,
+        wo: Vec3,
+        query: Query,
+        start: Start,
+        sampler: &mut Sampler,
+    ) -> Estimate {
+        let vertex = Vertex { world: self.world, surface: s, measure: Measure::Scattering { wi: s.frame.to_local(wo), query } };
+        let lobes = self.world.scene.materials[s.material as usize].bsdf.lobes();
+        let direction = lobes.intersects(Lobes::NON_DIFFUSE).then_some(wo);
+        let reached = Reached { s, query, start, direction };
+        let [direct, onward] = self.counts(&reached);
+        let from = vertex.receiver();
+        let mut sum = Estimate::default();
+        let share = Rgb::splat(1.0 / direct);
+        for k in 0..(direct + numbers[3]) as u32 {
+            if k > 0 {
+                numbers = sampler.branch(k << 16 | start.depth).next_4d();
+            }
+            let [x, y, choice, _] = numbers;
+            let light = keep_finite(vertex.direct(&from, choice, Vec2::new(x, y)));
+            let estimate = Estimate { light, cost: DIRECT_COST };
+            self.record(&reached, Kind::Direct, &estimate);
+            sum.add(estimate, share);
+        }
+        let mut numbers = sampler.next_4d();
+        let share = 1.0 / onward;
+        for k in 0..(onward + numbers[3]) as u32 {
+            let estimate = if k == 0 {
+                self.onward(&vertex, &from, &reached, numbers, share, sampler)
+            } else {
+                let mut branch = sampler.branch(k << 16 | 1 << 15 | start.depth);
+                numbers = branch.next_4d();
+                self.onward(&vertex, &from, &reached, numbers, share, &mut branch)
+            };
+            sum.add(estimate, Rgb::splat(share));
+        }
+        sum
+    }
+
+    fn record(&mut self, at: &Reached, kind: Kind, estimate: &Estimate) {
+        if let Some(tally) = self.tally.as_mut().filter(|_| at.query.lobes == Lobes::ALL) {
+            tally.record(at.s, at.direction, kind, estimate);
+        }
+    }
+
+    /// What one ray from a vertex brings.
+    fn onward(
+        &mut self,
+        vertex: &Vertex,
+        from: &Receiver,
+        at: &Reached,
+        [x, y, lobe, live]: [f32; 4],
+        share: f32,
+        sampler: &mut Sampler,
+    ) -> Estimate {
+        let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) else {
+            let nothing = Estimate { light: Rgb::ZERO, cost: DRAW_COST };
+            self.record(at, Kind::Onward, &nothing);
+            return nothing;
+        };
+        let mut weight = at.start.weight * sample.weight * share;
+        let (eta, depth) = (at.start.eta * sample.eta, at.start.depth + 1);
+        let mut survival = 1.0;
+        if self.plan.is_none() && depth >= self.params.rr_depth {
+            survival = (weight.max_element() * eta * eta * ROULETTE_MERCY).min(ROULETTE_CAP);
+            if live >= survival {
+                return Estimate { light: Rgb::ZERO, cost: DRAW_COST };
+            }
+            weight /= survival;
+        }
+        let ray = at.s.spawn(at.s.frame.to_world(sample.wo));
+        let found = (sample.pdf, sample.delta);
+        let next = self.incident(&ray, from, found, Start { weight, eta, depth }, sampler);
+        let estimate = Estimate { light: keep_finite(sample.weight * next.light), cost: RAY_COST + next.cost };
+        self.record(at, Kind::Onward, &estimate);
+        Estimate { light: estimate.light / survival, ..estimate }
+    }
+
+    /// Radiance along a ray: emission, weighted against the emitter sampling at its origin, and what is scattered there.
+    fn incident(&mut self, ray: &Ray, from: &Receiver, (pdf, delta): (f32, bool), at: Start, sampler: &mut Sampler) -> Estimate {
+        let world = self.world;
+        // Drawn before the ray is cast, so that tables can be fetched while it is under way.
+        let numbers = sampler.next_4d();
+        world.lights.prefetch(numbers[2], Vec2::new(numbers[0], numbers[1]));
+        let Some(s) = world.intersect(ray) else {
+            let light = world.lights.environment(ray.d);
+            let other = if delta || light == Rgb::ZERO { 0.0 } else { world.lights.pdf_environment(ray.d) };
+            return Estimate { light: light * power_heuristic(pdf, other), cost: 0.0 };
+        };
+        world.prefetch(&s);
+        let wo = -ray.d;
+        let mut sum = Estimate::default();
+        if s.emitter.is_some() {
+            let light = world.lights.emitted(&world.scene, &s, wo);
+            let other = if delta { 0.0 } else { world.lights.pdf_surface(&world.scene, from, &s) };
+            sum.light = light * power_heuristic(pdf, other);
+        }
+        if at.depth < self.params.max_depth {
+            sum.add(self.scattered_with(numbers, &s, wo, Query::default(), at, sampler), Rgb::ONE);
+        }
+        sum
+    }
+
+    /// How many emitters are drawn at a vertex, and how many rays leave it, on average; less than one is roulette.
+    fn counts(&self, at: &Reached) -> [f32; 2] {
+        let Some(plan) = self.plan else { return [1.0; 2] };
+        if at.start.depth == 0 {
+            return [1.0; 2];
+        }
+        let most = if at.start.depth > DEEP { 0.5 } else { ESTIMATES[1] };
+        let Some(moments) = plan.moments.at(at.s, at.direction) else { return [most.min(1.0); 2] };
+        let squared = at.start.weight * at.start.weight;
+        moments.map(|moment| {
+            let roulette = (squared.dot(moment.square) / 3.0).sqrt() * plan.efficiency;
+            let splitting = roulette * moment.variance.sqrt();
+            let best = if splitting > 1.0 { splitting } else { roulette.min(1.0) };
+            best.clamp(ESTIMATES[0], most)
+        })
+    }
+}
