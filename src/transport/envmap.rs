@@ -105,6 +105,14 @@ impl Envmap {
         self.columns[y].prefetch(v.x);
     }
 
+    /// Tells the caches what [`Envmap::sample`] will read of its image, which the distribution says.
+    pub fn prefetch_radiance(&self, v: Vec2) {
+        let (y, _) = self.rows.pick(v.y);
+        let (x, _) = self.columns[y].pick(v.x);
+        self.image.prefetch(x, y);
+        self.image.prefetch(x, (y + 1).min(self.image.height - 1));
+    }
+
     /// Cells of the bilinear grid: one a column, and one between each two rows.
     fn cells(&self) -> (usize, usize) {
         (self.image.width, (self.image.height - 1).max(1))

@@ -121,11 +121,27 @@ impl Lights {
         1.0 / self.shares().max(1) as f32
     }
 
-    /// Tells the caches what [`Lights::sample`] will read with the same numbers.
+    /// Tells the caches what [`Lights::sample`] will read first with the same numbers.
     #[inline]
     pub fn prefetch(&self, u: f32, v: Vec2) {
-        if let Some(Environment::Map(map)) = self.environments.get((u * self.shares() as f32) as usize) {
+        if let Some(map) = self.map(u) {
             map.prefetch(v);
+        }
+    }
+
+    /// Tells the caches what it will read then; best some time after [`Lights::prefetch`].
+    #[inline]
+    pub fn prefetch_radiance(&self, u: f32, v: Vec2) {
+        if let Some(map) = self.map(u) {
+            map.prefetch_radiance(v);
+        }
+    }
+
+    /// The image that `u` chooses.
+    fn map(&self, u: f32) -> Option<&Envmap> {
+        match self.environments.get((u * self.shares() as f32) as usize)? {
+            Environment::Map(map) => Some(map),
+            _ => None,
         }
     }
 

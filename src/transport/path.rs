@@ -269,6 +269,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
             }
             return sum;
         };
+        world.lights.prefetch_radiance(light_choice, Vec2::new(light_x, light_y));
         world.prefetch(&surface);
         let wo = -ray.d;
         if surface.emitter.is_some() {

@@ -7,13 +7,13 @@ use crate::base::prefetch::prefetch_at;
 pub struct Steps {
     /// From 0 to 1; one entry more than there are outcomes.
     pub(crate) sums: Vec<f32>,
-    /// For each of the equal parts of [0, 1], one for [`PER_PART`] outcomes: the first step that may hold one of its numbers.
-    guide: Vec<u32>,
+    /// For each of the equal parts of [0, 1], one for [`PER_PART`] outcomes: the first and the last step that may hold one of its numbers.
+    guide: Vec<[u32; 2]>,
 }
 
-/// Outcomes for which the table has one entry: half a line of the cache of `sums`, which is read anyway; with one entry for each
-/// outcome the tables of an environment's rows drive one another out of the cache.
-const PER_PART: usize = 8;
+/// Outcomes for which the table has one entry: two lines of the cache of `sums`. With an entry for each outcome, the tables of an
+/// environment's rows drive one another out of the cache.
+const PER_PART: usize = 32;
 
 impl Steps {
     /// The distribution in proportion to `values` (not negative, at least one), and their sum. Even where that is zero.
@@ -34,39 +34,33 @@ impl Steps {
                 i => i as f32 / last as f32,
             })
             .collect();
-        let mut step = 0;
         let parts = last.div_ceil(PER_PART);
+        // A little early where parts begin and a little late where they end, against rounding.
+        let step = |u: f32| (sums.partition_point(|&sum| sum <= u).max(1) - 1).min(last - 1) as u32;
+        let edge = |part: usize| part as f32 / parts as f32;
         let guide = (0..parts)
-            .map(|part| {
-                // A little early, against rounding.
-                let low = (part as f32 / parts as f32) * (1.0 - 4.0 * f32::EPSILON);
-                while step + 1 < last && sums[step + 1] <= low {
-                    step += 1;
-                }
-                step as u32
-            })
-            .collect();
+            .map(|part| [edge(part) * (1.0 - 4.0 * f32::EPSILON), edge(part + 1) * (1.0 + 4.0 * f32::EPSILON)].map(step));
+        let guide = guide.collect();
         (Self { sums, guide }, total)
     }
 
-    /// A step at or before the one that `u` falls on.
-    fn start(&self, u: f32) -> usize {
+    /// The first and the last step that `u` may fall on.
+    fn bounds(&self, u: f32) -> [usize; 2] {
         let parts = self.guide.len();
-        self.guide[((u * parts as f32) as usize).min(parts - 1)] as usize
+        self.guide[((u * parts as f32) as usize).min(parts - 1)].map(|step| step as usize)
     }
 
     /// Tells the caches what [`Steps::pick`] will read.
     pub fn prefetch(&self, u: f32) {
-        prefetch_at(&self.sums, self.start(u));
+        let [first, last] = self.bounds(u);
+        prefetch_at(&self.sums, first);
+        prefetch_at(&self.sums, last);
     }
 
     /// The outcome that `u` in [0, 1) falls on, and where in its step, in [0, 1).
     pub fn pick(&self, u: f32) -> (usize, f32) {
-        let last = self.sums.len() - 1;
-        let mut step = self.start(u);
-        while step + 1 < last && self.sums[step + 1] <= u {
-            step += 1;
-        }
+        let [first, last] = self.bounds(u);
+        let step = first + self.sums[first + 1..=last].partition_point(|&sum| sum <= u);
         let height = self.sums[step + 1] - self.sums[step];
         let rest = if height > 0.0 { (u - self.sums[step]) / height } else { 0.0 };
         (step, rest.clamp(0.0, 1.0 - f32::EPSILON))

@@ -183,6 +183,7 @@ impl Walk<'_> {
             let other = if delta || light == Rgb::ZERO { 0.0 } else { world.lights.pdf_environment(ray.d) };
             return Estimate { light: light * power_heuristic(pdf, other), cost: 0.0 };
         };
+        world.lights.prefetch_radiance(numbers[2], Vec2::new(numbers[0], numbers[1]));
         world.prefetch(&s);
         let wo = -ray.d;
         let mut sum = Estimate::default();
