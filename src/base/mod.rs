@@ -1,4 +1,4 @@
-//! What every room stands on: small geometry, rays, errors, progress, clocks.
+//! What every room stands on: small geometry, lanes, rays, errors, progress, clocks.
 
 pub mod clock;
 pub mod error;
@@ -6,3 +6,4 @@ pub mod math;
 pub mod named;
 pub mod progress;
 pub mod ray;
+pub mod simd;

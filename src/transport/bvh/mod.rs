@@ -9,7 +9,6 @@
 
 mod cut;
 mod round;
-mod simd;
 #[cfg(test)]
 mod tests;
 mod traverse;
@@ -19,6 +18,7 @@ mod wide;
 use super::facet::uv_at;
 use crate::base::math::{hash_words, unit};
 use crate::base::ray::{Hit, Ray};
+use crate::base::simd::{Kernel, Lanes, Simd};
 use crate::scene::normals::unit_normal;
 use crate::scene::{Geometry, Round, Scene};
 use glam::Vec3A;
@@ -27,8 +27,6 @@ use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use round::RoundTree;
-#[cfg(target_arch = "x86_64")]
-use simd::{Avx2, Avx512, Portable, Simd};
 use std::cell::RefCell;
 use traverse::STACK;
 use wide::Tree;
@@ -52,7 +50,6 @@ pub struct Bvh {
     /// The triangles that it is built over.
     kept: Vec<u32>,
     margin: f32,
-    #[cfg(target_arch = "x86_64")]
     lanes: Lanes,
 }
 
@@ -84,8 +81,7 @@ impl Bvh {
             rounds: RoundTree::build(geometry, keep, round_extent * BOX_MARGIN),
             kept,
             margin,
-            #[cfg(target_arch = "x86_64")]
-            lanes: Lanes::detect(),
+            lanes: Lanes::chosen(),
         }
     }
 
@@ -100,15 +96,7 @@ impl Bvh {
     }
 
     fn closest_triangle(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
-        let passes = &mut |hit: &Hit| passes(scene, ray, hit);
-        #[cfg(target_arch = "x86_64")]
-        match self.lanes {
-            // SAFETY: the machine has what the value stands for.
-            Lanes::Avx512(s) => return unsafe { closest_avx512(s, &self.tree, ray, passes) },
-            Lanes::Avx2(s) => return unsafe { closest_avx2(s, &self.tree, ray, passes) },
-            Lanes::Portable => {}
-        }
-        closest_with(Portable, &self.tree, ray, passes)
+        self.lanes.run(Closest(&self.tree, ray, &mut |hit: &Hit| passes(scene, ray, hit)))
     }
 
     /// Whether anything lies in [t_min, t_max].
@@ -119,15 +107,7 @@ impl Bvh {
     }
 
     fn triangle_occludes(&self, scene: &Scene, ray: &Ray) -> bool {
-        let passes = &mut |hit: &Hit| passes(scene, ray, hit);
-        #[cfg(target_arch = "x86_64")]
-        match self.lanes {
-            // SAFETY: the machine has what the value stands for.
-            Lanes::Avx512(s) => return unsafe { any_avx512(s, &self.tree, ray, passes) },
-            Lanes::Avx2(s) => return unsafe { any_avx2(s, &self.tree, ray, passes) },
-            Lanes::Portable => {}
-        }
-        any_with(Portable, &self.tree, ray, passes)
+        self.lanes.run(Any(&self.tree, ray, &mut |hit: &Hit| passes(scene, ray, hit)))
     }
 
     /// The same triangles in the compressed tree that GPUs read, and their indices in the order of its leaves. `geometry` is what
@@ -136,23 +116,6 @@ impl Bvh {
         let tree = bvh2_to_cwbvh(&triangle_tree(geometry, &self.kept, self.margin), MAX_COMPRESSED_LEAF, true, false);
         let triangles = tree.primitive_indices.iter().map(|&i| self.kept[i as usize]).collect();
         (tree, triangles)
-    }
-}
-
-/// Forms of the traversal that the machine may have.
-#[cfg(target_arch = "x86_64")]
-#[derive(Clone, Copy)]
-enum Lanes {
-    Avx512(Avx512),
-    Avx2(Avx2),
-    Portable,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Lanes {
-    fn detect() -> Self {
-        let avx2 = || Avx2::detect().map_or(Self::Portable, Self::Avx2);
-        Avx512::detect().map_or_else(avx2, Self::Avx512)
     }
 }
 
@@ -183,46 +146,41 @@ thread_local! {
     static STACKS: RefCell<([f32; STACK], [u32; STACK])> = const { RefCell::new(([0.0; STACK], [0; STACK])) };
 }
 
-#[inline(always)]
-fn closest_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    if tree.stack <= STACK {
-        STACKS.with_borrow_mut(|(entries, ids)| traverse::closest(s, tree, ray, (entries, ids), passes))
-    } else {
-        traverse::closest(s, tree, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
+/// What may wave a hit through.
+type Passes<'a> = &'a mut dyn FnMut(&Hit) -> bool;
+
+/// The first hit.
+struct Closest<'a>(&'a Tree, &'a Ray, Passes<'a>);
+
+impl Kernel for Closest<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Option<Hit> {
+        let Self(tree, ray, passes) = self;
+        if tree.stack <= STACK {
+            STACKS.with_borrow_mut(|(entries, ids)| traverse::closest(s, tree, ray, (entries, ids), passes))
+        } else {
+            traverse::closest(s, tree, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
+        }
     }
 }
 
-#[inline(always)]
-fn any_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
-    if tree.stack <= STACK {
-        STACKS.with_borrow_mut(|(_, ids)| traverse::any(s, tree, ray, ids, passes))
-    } else {
-        traverse::any(s, tree, ray, &mut vec![0; tree.stack], passes)
+/// Whether there is any.
+struct Any<'a>(&'a Tree, &'a Ray, Passes<'a>);
+
+impl Kernel for Any<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> bool {
+        let Self(tree, ray, passes) = self;
+        if tree.stack <= STACK {
+            STACKS.with_borrow_mut(|(_, ids)| traverse::any(s, tree, ray, ids, passes))
+        } else {
+            traverse::any(s, tree, ray, &mut vec![0; tree.stack], passes)
+        }
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn closest_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    closest_with(s, tree, ray, passes)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn any_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
-    any_with(s, tree, ray, passes)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn closest_avx512(s: Avx512, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    closest_with(s, tree, ray, passes)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn any_avx512(s: Avx512, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
-    any_with(s, tree, ray, passes)
 }
 
 /// Whether `ray` goes through a triangle of partly opaque material.

@@ -1,9 +1,9 @@
 //! Walks through the eight-wide tree: nearest octant first for the closest hit, farthest first for any hit.
 
-use super::simd::Simd;
 use super::triangle::Shear;
 use super::wide::{Block, MARK, Node, Tree};
 use super::{Hit, Ray};
+use crate::base::simd::Simd;
 
 /// Distances to the far sides of boxes grow by this much against rounding: 4 ulp, where the slab test can lose 3 (compare Ize 2013).
 const FAR_SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
