@@ -111,8 +111,8 @@ impl ParameterMap {
     }
 
     /// All of those factors, at half the probe's resolution (rounded up).
-    pub fn search_scales(&self) -> Vec<Vec2> {
-        self.derivative.iter().map(scale).collect()
+    pub fn search_scales(&self) -> impl Iterator<Item = Vec2> {
+        self.derivative.iter().map(scale)
     }
 
     /// Log of texel density, relative to plain lat-long, in each quad of the mesh: ln of the area that the quad's image takes.

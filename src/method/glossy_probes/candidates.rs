@@ -23,7 +23,8 @@ pub struct Candidates {
     pub directions: Vec<Directions>,
     /// What is fetched in the end.
     pub light: Vec<Light>,
-    /// [`crate::probe::parameter_map::ParameterMap::search_scale`] at half the probe's resolution; not on a GPU.
+    /// [`crate::probe::parameter_map::ParameterMap::search_scale`] at half the probe's resolution, and one more, so that two can be read of the
+    /// last; not on a GPU.
     pub(crate) scale: Vec<Vec2>,
 }
 
@@ -114,7 +115,7 @@ impl Candidates {
             seen: with_reflectors().map(seen).collect(),
             directions: with_reflectors().map(directions).collect(),
             light: with_reflectors().map(light).collect(),
-            scale: probe.map.search_scales(),
+            scale: probe.map.search_scales().chain([Vec2::ONE]).collect(),
         }
     }
 }

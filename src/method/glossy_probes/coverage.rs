@@ -8,10 +8,11 @@
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::base::named::within;
-use crate::base::ray::Ray;
+use crate::base::ray::{Hit, Ray};
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
 use crate::transport::World;
+use crate::transport::bvh::BEAM;
 use crate::view::gbuffer::{GBuffer, Pixel, view_alpha};
 use crate::view::mirror::{Reflected, facing_normal, mirror_hit};
 use crate::view::mirror_light::mirror_light;
@@ -235,22 +236,31 @@ impl Lit<'_> {
     fn pixel(&self, camera: &Camera, rays: u32, [x, y]: [usize; 2], shown: &Strip, window: &Window) -> Covered {
         let corner = Vec2::new(x as f32, y as f32);
         let mut sum = Covered::default();
-        for k in 0..rays {
-            let at = corner + lattice_point(k, rays);
-            let seen = self.along(&camera.ray(at, Vec2::splat(0.5)), shown, window, at * shown.sub.n as f32);
-            sum.emission += seen.emission;
-            sum.diffuse += seen.diffuse;
-            sum.glossy += seen.glossy;
+        let place = |k: u32| corner + lattice_point(k, rays);
+        for first in (0..rays).step_by(BEAM) {
+            let count = (rays - first).min(BEAM as u32) as usize;
+            let beam: [Ray; BEAM] = std::array::from_fn(|i| {
+                let k = first + i.min(count - 1) as u32;
+                camera.ray(place(k), Vec2::splat(0.5))
+            });
+            let hits = self.world.closest_of(&beam[..count]);
+            for (i, (ray, hit)) in beam[..count].iter().zip(hits).enumerate() {
+                let at = place(first + i as u32) * shown.sub.n as f32;
+                let seen = self.along((ray, hit), shown, window, at);
+                sum.emission += seen.emission;
+                sum.diffuse += seen.diffuse;
+                sum.glossy += seen.glossy;
+            }
         }
         let scale = 1.0 / rays as f32;
         let glossy = (sum.glossy * scale).max(Rgb::ZERO);
         Covered { emission: sum.emission * scale, diffuse: sum.diffuse * scale, glossy }
     }
 
-    /// What a ray through `at` (sub-pixels) shows.
-    fn along(&self, ray: &Ray, shown: &Strip, window: &Window, at: Vec2) -> Covered {
+    /// What a ray through `at` (sub-pixels), whose first hit is known, shows.
+    fn along(&self, (ray, hit): (&Ray, Option<Hit>), shown: &Strip, window: &Window, at: Vec2) -> Covered {
         let Self { world, lightmap, mirrors } = *self;
-        let Some(surface) = world.seen(ray) else {
+        let Some(surface) = world.seen_from(ray, hit) else {
             return Covered { emission: world.backdrop(ray.d), ..Covered::default() };
         };
         let wo = -ray.d;

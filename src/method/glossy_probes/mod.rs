@@ -7,6 +7,7 @@
 //! A frame, pass by pass: [`renderer`] is the table of contents (§5, §6). [`rays`] may be joined with it.
 
 pub mod bake;
+mod between;
 mod blend;
 pub mod candidates;
 mod cholesky;

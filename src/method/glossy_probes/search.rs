@@ -4,11 +4,12 @@
 //!
 //! *Ours*: one pixel in so many each way, an anchor, is searched for in full; those between begin where it ended.
 
+use super::between::{Anchors, Begin, Block};
 use super::candidates::WeightedProbe;
 use super::gather::GatherParams;
 use super::perturb::Perturbation;
 use super::perturb_lanes::Paths;
-use super::window::{Target, Texels, Window, windows};
+use super::window::{Target, Texels, windows};
 use crate::base::simd::{Kernel, Lanes, Simd};
 use crate::view::gbuffer::{GBuffer, Pixel};
 use crate::view::mirror::{NOTHING, Reflected};
@@ -66,7 +67,7 @@ impl Samples {
         energy.is_finite().then(|| Sample { energy, texel: Vec2::new(self.texel[0][k], self.texel[1][k]) })
     }
 
-    fn set(&mut self, k: usize, sample: Sample) {
+    pub(crate) fn set(&mut self, k: usize, sample: Sample) {
         self.energy[k] = sample.energy;
         (self.texel[0][k], self.texel[1][k]) = (sample.texel.x, sample.texel.y);
     }
@@ -103,36 +104,38 @@ impl Kernel for BestSamples<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Vec<Samples> {
         let Self { tile, params, .. } = self;
-        let (targets, paths) = self.prepare();
-        let windows = windows(&params.search);
         let step = params.anchors.max(1);
+        let (targets, paths) = self.prepare();
+        let blocks: Vec<Block> = targets.chunks(8).map(|targets| Block::new(targets, step)).collect();
+        let windows = windows(&params.search);
         let mut samples = vec![Samples::NONE; tile.len()];
-        let mut begins = vec![Begin { x: [0.0; 8], y: [0.0; 8], valid: 0 }; paths.len()];
+        let mut begins = vec![Begin::NOWHERE; paths.len()];
         for (k, w) in self.probes.iter().enumerate().take(8) {
             let texels = Texels::new(s, w, params);
             for (begin, paths) in begins.iter_mut().zip(&paths) {
-                let (at, valid) = texels.towards(paths.reflection_points(s, w.probe.position));
-                (begin.x, begin.y, begin.valid) = (at.x.array(), at.y.array(), valid);
+                *begin = Begin::new(texels.towards(paths.reflection_points(s, w.probe.position)));
             }
-            // By place in the tile: where an anchor's search ended, from where it began.
-            let mut ends = [Anchor::NONE; TILE * TILE];
-            for is_anchor in [true, false] {
-                for (at, target) in targets.iter().enumerate() {
-                    let place = [target.place % TILE, target.place / TILE];
-                    if (place[0].is_multiple_of(step) && place[1].is_multiple_of(step)) != is_anchor {
+            let mut anchors = Anchors::NONE;
+            // A bit for each pixel of a block that is searched for in full: the anchors, and then those that they do not lead to.
+            let mut left: Vec<u32> = blocks.iter().zip(&begins).map(|(block, begin)| block.anchors & begin.valid).collect();
+            for are_anchors in [true, false] {
+                for at in 0..blocks.len() * 8 {
+                    if left[at / 8] >> (at % 8) & 1 == 0 {
                         continue;
                     }
-                    let Some(centre) = begins[at / 8].of(at % 8) else { continue };
-                    let around = if is_anchor { Around::NONE } else { Around::of(&ends, place, step, target.material) };
-                    let Some(found) = sample(&texels, &windows, target, centre, &around) else { continue };
+                    let (centre, target) = (begins[at / 8].of(at % 8), &targets[at]);
+                    let Some(found) = texels.search(&windows, centre, target) else { continue };
                     samples[at].set(k, found);
-                    if is_anchor {
-                        let end = found.texel - centre;
-                        ends[target.place] = Anchor { end, energy: found.energy, material: target.material };
+                    if are_anchors {
+                        anchors.set(target, found, centre);
                     }
                 }
-                if step == 1 {
+                if !are_anchors || step == 1 {
                     break;
+                }
+                for (at, (block, begin)) in blocks.iter().zip(&begins).enumerate() {
+                    let some = at * 8..tile.len().min(at * 8 + 8);
+                    left[at] = block.between(&texels, &anchors, begin, windows.last(), (k, &mut samples[some]));
                 }
             }
         }
@@ -161,89 +164,5 @@ impl BestSamples<'_> {
         let (targets, paths): (Vec<_>, Vec<_>) = tile.iter().map(of).unzip();
         let eight = |paths: &[Perturbation]| Paths::new(&std::array::from_fn(|i| paths[i.min(paths.len() - 1)]));
         (targets, paths.chunks(8).map(eight).collect())
-    }
-}
-
-/// Where a probe sees what eight pixels reflect, texels.
-#[derive(Clone)]
-struct Begin {
-    x: [f32; 8],
-    y: [f32; 8],
-    /// A bit for each that is anywhere.
-    valid: u32,
-}
-
-impl Begin {
-    #[inline(always)]
-    fn of(&self, i: usize) -> Option<Vec2> {
-        (self.valid >> i & 1 == 1).then(|| Vec2::new(self.x[i], self.y[i]))
-    }
-}
-
-/// How an anchor's search ended.
-#[derive(Clone, Copy)]
-struct Anchor {
-    /// From where it began, texels.
-    end: Vec2,
-    /// Infinite where nothing was found.
-    energy: f32,
-    /// Of the anchor's reflector.
-    material: u32,
-}
-
-impl Anchor {
-    const NONE: Self = Self { end: Vec2::ZERO, energy: f32::INFINITY, material: u32::MAX };
-}
-
-/// The ends of the anchors around a pixel that are of its material, the first one again in the lanes that are left over.
-struct Around {
-    x: [f32; 8],
-    y: [f32; 8],
-    /// The most that a sample may have.
-    allowed: f32,
-    count: usize,
-}
-
-impl Around {
-    const NONE: Self = Self { x: [0.0; 8], y: [0.0; 8], allowed: 0.0, count: 0 };
-
-    #[inline(always)]
-    fn of(ends: &[Anchor; TILE * TILE], place: [usize; 2], step: usize, material: u32) -> Self {
-        let [x, y] = [place[0] / step * step, place[1] / step * step];
-        let mut around = Self::NONE;
-        for (dx, dy) in [(0, 0), (step, 0), (0, step), (step, step)] {
-            if x + dx >= TILE || y + dy >= TILE {
-                continue;
-            }
-            let anchor = ends[(y + dy) * TILE + x + dx];
-            if anchor.material != material {
-                continue;
-            }
-            let at = around.count;
-            if at == 0 {
-                (around.x, around.y) = ([anchor.end.x; 8], [anchor.end.y; 8]);
-            }
-            (around.x[at], around.y[at], around.count) = (anchor.end.x, anchor.end.y, at + 1);
-            around.allowed = around.allowed.max(anchor.energy * ANCHOR_TOLERANCE.0 + ANCHOR_TOLERANCE.1);
-        }
-        around
-    }
-}
-
-/// A pixel's sample: the one that the anchors around it lead to, by the finest level alone; where that is much worse than theirs, or there
-/// is none, the one that a search in full finds.
-#[inline(always)]
-fn sample<S: Simd>(texels: &Texels<S>, windows: &[Window], target: &Target, centre: Vec2, around: &Around) -> Option<Sample> {
-    let mut start = if around.count > 0 { texels.best_of(&around.x, &around.y, centre, target) } else { None };
-    loop {
-        let (levels, allowed) = match start {
-            Some(_) => (&windows[windows.len().saturating_sub(1)..], around.allowed),
-            None => (windows, f32::INFINITY),
-        };
-        match texels.search(levels, start, centre, target) {
-            Some(found) if found.energy <= allowed => return Some(found),
-            _ if start.is_some() => start = None,
-            _ => return None,
-        }
     }
 }

@@ -26,9 +26,78 @@ pub(crate) struct Target {
     pub(crate) place: usize,
 }
 
+/// Eight of them, field by field.
+pub(crate) struct Targets {
+    normal: [[f32; 8]; 3],
+    direction: [[f32; 8]; 3],
+    point: [[f32; 8]; 3],
+    alpha: [f32; 8],
+    reflected: [u32; 8],
+    material: [u32; 8],
+}
+
+impl Targets {
+    /// One to eight; the first again in the lanes that are left over.
+    pub(crate) fn new(targets: &[Target]) -> Self {
+        let lane = |i: usize| targets.get(i).unwrap_or(&targets[0]);
+        let axes = |get: fn(&Target) -> Vec3| [0, 1, 2].map(|axis| std::array::from_fn(|i| get(lane(i))[axis]));
+        Self {
+            normal: axes(|t| t.normal),
+            direction: axes(|t| t.direction),
+            point: axes(|t| t.reflected.point),
+            alpha: std::array::from_fn(|i| lane(i).alpha),
+            reflected: std::array::from_fn(|i| lane(i).reflected.material.into()),
+            material: std::array::from_fn(|i| lane(i).material),
+        }
+    }
+}
+
+/// What eight lanes look for, each its own or all the same.
+pub(crate) struct Sought<S: Simd> {
+    normal: V3<S>,
+    direction: V3<S>,
+    point: V3<S>,
+    alpha: F8<S>,
+    reflected: S::I,
+    pub(crate) material: S::I,
+    is_sky: M8<S>,
+}
+
+impl<S: Simd> Sought<S> {
+    #[inline(always)]
+    pub(crate) fn one(s: S, target: &Target) -> Self {
+        let reflected = s.splat_ids(target.reflected.material.into());
+        Self {
+            normal: V3::splat(s, target.normal),
+            direction: V3::splat(s, target.direction),
+            point: V3::splat(s, target.reflected.point),
+            alpha: F8::splat(s, target.alpha),
+            reflected,
+            material: s.splat_ids(target.material),
+            is_sky: M8(s, s.same_ids(reflected, s.splat_ids(SKY.into()))),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn eight(s: S, targets: &Targets) -> Self {
+        let reflected = s.load_ids(&targets.reflected);
+        Self {
+            normal: V3::load(s, &targets.normal),
+            direction: V3::load(s, &targets.direction),
+            point: V3::load(s, &targets.point),
+            alpha: F8::load(s, &targets.alpha),
+            reflected,
+            material: s.load_ids(&targets.material),
+            is_sky: M8(s, s.same_ids(reflected, s.splat_ids(SKY.into()))),
+        }
+    }
+}
+
 /// The samples of one level, in steps from its centre.
 pub(crate) struct Window {
-    step: f32,
+    pub(crate) step: f32,
+    /// Rows from the top, without the centre.
+    pub(crate) places: Vec<[f32; 2]>,
     /// Rows from the top, eight at a time; the first of them again in what is left over of the last eight.
     all: Vec<[[f32; 8]; 2]>,
     /// Without the centre.
@@ -46,14 +115,14 @@ pub(crate) fn windows(levels: &[SearchLevel]) -> Vec<Window> {
         let square = (-radius..=radius).flat_map(|y| (-radius..=radius).map(move |x| [x as f32, y as f32]));
         let all: Vec<_> = square.collect();
         let around: Vec<_> = all.iter().copied().filter(|at| *at != [0.0; 2]).collect();
-        Window { step: level.step, all: eights(&all), around: eights(&around) }
+        Window { step: level.step, all: eights(&all), around: eights(&around), places: around }
     };
     levels.iter().map(window).collect()
 }
 
 /// A probe's texels and its parameterisation.
 pub(crate) struct Texels<'a, S: Simd> {
-    s: S,
+    pub(crate) s: S,
     position: Vec3,
     size: [f32; 2],
     /// Texels in a row.
@@ -144,16 +213,15 @@ impl<'a, S: Simd> Texels<'a, S> {
         s.add_ids(s.mul_ids(row.ids(), self.row), column.ids())
     }
 
-    /// The lane of least E of Eq. 1 among eight texel coordinates, and that energy, where it is below `limit` and the reflectors are of
-    /// one material. Of equals the first. Zero is a perfect match; at most (3 + s_e) s_a.
+    /// E of Eq. 1 of eight texel coordinates, and where it is below `limit` and the reflectors are of one material; `None` where it is nowhere.
+    /// Zero is a perfect match; at most (3 + s_e) s_a.
     #[inline(always)]
-    fn best(&self, x: F8<S>, y: F8<S>, limit: f32, target: &Target) -> Option<(usize, f32)> {
+    pub(crate) fn energies(&self, x: F8<S>, y: F8<S>, limit: F8<S>, sought: &Sought<S>) -> Option<(M8<S>, F8<S>)> {
         let s = self.s;
         let texel = self.indices(x, y);
-        let (s_a, s_b, rest) = self.reflected(texel, target);
+        let (s_a, s_b, same) = self.reflected(texel, sought);
         // The reflected hit alone rules most texels out.
-        let limit = F8::splat(s, limit);
-        let candidates = rest & (s_a * s_b).less(limit);
+        let candidates = same & (s_a * s_b).less(limit);
         if candidates.bits() == 0 {
             return None;
         }
@@ -162,13 +230,19 @@ impl<'a, S: Simd> Texels<'a, S> {
         let [_, dy, dz, alpha] = s.fours(self.directions, s.add_ids(at, s.splat_ids(3)));
         let normal = V3 { x: F8(s, nx), y: F8(s, ny), z: F8(s, nz) };
         let direction = V3 { x: F8(s, dx), y: F8(s, dy), z: F8(s, dz) };
-        let s_c = V3::splat(s, target.normal).dot(normal) * -1.0 + 1.0;
-        let s_d = V3::splat(s, target.direction).dot(direction) * -1.0 + 1.0;
-        let own = F8::splat(s, target.alpha);
-        let (both, differs) = (own + F8(s, alpha), (own - F8(s, alpha)).abs());
+        let s_c = sought.normal.dot(normal) * -1.0 + 1.0;
+        let s_d = sought.direction.dot(direction) * -1.0 + 1.0;
+        let (both, differs) = (sought.alpha + F8(s, alpha), (sought.alpha - F8(s, alpha)).abs());
         let s_e = both.above(0.0).choose(differs * self.roughness_penalty / both, F8::splat(s, 0.0));
         let energy = s_a * (s_b + s_c.clamp(0.0, 1.0) + s_d.clamp(0.0, 1.0) + s_e);
-        let better = candidates & energy.less(limit);
+        Some((candidates & energy.less(limit), energy))
+    }
+
+    /// The lane of least energy among eight texel coordinates, and that energy, where it is below `limit`. Of equals the first.
+    #[inline(always)]
+    fn best(&self, x: F8<S>, y: F8<S>, limit: f32, sought: &Sought<S>) -> Option<(usize, f32)> {
+        let s = self.s;
+        let (better, energy) = self.energies(x, y, F8::splat(s, limit), sought)?;
         if better.bits() == 0 {
             return None;
         }
@@ -178,44 +252,42 @@ impl<'a, S: Simd> Texels<'a, S> {
         Some((lane as usize & 7, least))
     }
 
-    /// s_a and s_b, the distance of the reflected hits, m, at most 1; and which reflectors are of the target's material. Two hits at
+    /// s_a and s_b, the distance of the reflected hits, m, at most 1; and which reflectors are of the material sought. Two hits at
     /// infinity differ by the chord between their directions, as at a distance of 1 m; one at infinity and one not are as far apart as the
     /// energy can say.
     #[inline(always)]
-    fn reflected(&self, texel: S::I, target: &Target) -> (F8<S>, F8<S>, M8<S>) {
+    fn reflected(&self, texel: S::I, sought: &Sought<S>) -> (F8<S>, F8<S>, M8<S>) {
         let s = self.s;
         let [x, y, z, materials] = s.fours(self.seen, s.shift_up::<2>(texel));
         let words = s.bits(materials);
         let reflected = s.and_ids(words, s.splat_ids(0xffff));
         let one = F8::splat(s, 1.0);
-        let s_a = self.same(reflected, target.reflected.material.into()).choose(one, F8::splat(s, self.material_penalty));
-        let d = V3 { x: F8(s, x), y: F8(s, y), z: F8(s, z) } - V3::splat(s, target.reflected.point);
+        let s_a = M8(s, s.same_ids(reflected, sought.reflected)).choose(one, F8::splat(s, self.material_penalty));
+        let d = V3 { x: F8(s, x), y: F8(s, y), z: F8(s, z) } - sought.point;
         let distance = d.dot(d).sqrt().min(one);
-        let is_sky = self.same(reflected, SKY.into());
-        let s_b = if target.reflected.is_sky() { is_sky.choose(distance, one) } else { is_sky.choose(one, distance) };
-        (s_a, s_b, self.same(s.shift_down::<16>(words), target.material))
+        let is_sky = M8(s, s.same_ids(reflected, s.splat_ids(SKY.into())));
+        let alike = (is_sky & sought.is_sky) | !(is_sky | sought.is_sky);
+        (s_a, alike.choose(distance, one), M8(s, s.same_ids(s.shift_down::<16>(words), sought.material)))
     }
 
+    /// Factors on the steps about eight texel coordinates.
     #[inline(always)]
-    fn same(&self, a: S::I, b: u32) -> M8<S> {
-        M8(self.s, self.s.same_ids(a, self.s.splat_ids(b)))
+    pub(crate) fn scales(&self, at: V2<S>) -> V2<S> {
+        let (s, [w, h]) = (self.s, self.half);
+        let x = (at.x * 0.5).clamp(0.0, (w - 1) as f32).ids();
+        let y = (at.y * 0.5).clamp(0.0, (h - 1) as f32).ids();
+        let place = s.shift_up::<1>(s.add_ids(s.mul_ids(y, s.splat_ids(w)), x));
+        let [x, y, ..] = s.fours(bytemuck::cast_slice(self.scale), place);
+        V2 { x: F8(s, x), y: F8(s, y) }
     }
 
-    /// The best of eight texel coordinates, given from `centre`.
+    /// The texel coordinate of least energy around `centre`, coarse level first. Only texels whose reflector is of the target's material
+    /// count; `None` where there is none.
     #[inline(always)]
-    pub(crate) fn best_of(&self, x: &[f32; 8], y: &[f32; 8], centre: Vec2, target: &Target) -> Option<Sample> {
+    pub(crate) fn search(&self, levels: &[Window], centre: Vec2, target: &Target) -> Option<Sample> {
         let s = self.s;
-        let (at_x, at_y) = (F8::load(s, x) + centre.x, F8::load(s, y) + centre.y);
-        let (lane, energy) = self.best(at_x, at_y, f32::INFINITY, target)?;
-        Some(Sample { energy, texel: centre + Vec2::new(x[lane], y[lane]) })
-    }
-
-    /// The texel coordinate of least energy around `centre`, coarse level first; `known` is a sample to begin at in its place.
-    /// Only texels whose reflector is of the target's material count; `None` where there is none.
-    #[inline(always)]
-    pub(crate) fn search(&self, levels: &[Window], known: Option<Sample>, centre: Vec2, target: &Target) -> Option<Sample> {
-        let s = self.s;
-        let mut found = known.unwrap_or(Sample { energy: f32::INFINITY, texel: centre });
+        let sought = Sought::one(s, target);
+        let mut found = Sample { energy: f32::INFINITY, texel: centre };
         for level in levels {
             let centre = found.texel;
             let step = self.scale_at(centre) * level.step;
@@ -223,7 +295,7 @@ impl<'a, S: Simd> Texels<'a, S> {
             for [x, y] in places {
                 let at_x = F8::load(s, x) * step.x + centre.x;
                 let at_y = F8::load(s, y) * step.y + centre.y;
-                if let Some((lane, energy)) = self.best(at_x, at_y, found.energy, target) {
+                if let Some((lane, energy)) = self.best(at_x, at_y, found.energy, &sought) {
                     found = Sample { energy, texel: Vec2::new(centre.x + step.x * x[lane], centre.y + step.y * y[lane]) };
                 }
             }

@@ -7,6 +7,7 @@
 //! below that opacity. Repeating a ray repeats its answer, and the mean over many rays is the opacity. The two faces of a thin
 //! sheet (a blind, a leaf) count once, as in Mitsuba, which steps over the second: see [`SHEET`].
 
+mod beam;
 mod cut;
 mod round;
 #[cfg(test)]
@@ -15,12 +16,15 @@ mod traverse;
 mod triangle;
 mod wide;
 
+pub use beam::BEAM;
+
 use super::facet::uv_at;
 use crate::base::math::{hash_words, unit};
 use crate::base::ray::{Hit, Ray};
 use crate::base::simd::{Kernel, Lanes, Simd};
 use crate::scene::normals::unit_normal;
 use crate::scene::{Geometry, Round, Scene};
+use beam::Beam;
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
@@ -95,6 +99,19 @@ impl Bvh {
         }
     }
 
+    /// First hits of rays, which are followed together where they begin at one point and go in much the same direction, [`BEAM`] at the
+    /// most: each one's [`Bvh::closest`].
+    pub fn closest_of(&self, scene: &Scene, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        match Beam::new(rays).filter(|_| self.rounds.is_none() && self.tree.stack <= STACK) {
+            Some(beam) => {
+                let passes = &mut |ray: usize, hit: &Hit| passes(scene, &rays[ray], hit);
+                let found = self.lanes.run(Together(&self.tree, &beam, passes));
+                hits.iter_mut().zip(found).for_each(|(to, hit)| *to = hit);
+            }
+            None => hits.iter_mut().zip(rays).for_each(|(to, ray)| *to = self.closest(scene, ray)),
+        }
+    }
+
     fn closest_triangle(&self, scene: &Scene, ray: &Ray) -> Option<Hit> {
         self.lanes.run(Closest(&self.tree, ray, &mut |hit: &Hit| passes(scene, ray, hit)))
     }
@@ -163,6 +180,19 @@ impl Kernel for Closest<'_> {
         } else {
             traverse::closest(s, tree, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
         }
+    }
+}
+
+/// The first hits of a beam, in a tree for which the thread's stack is deep enough.
+struct Together<'a>(&'a Tree, &'a Beam<'a>, &'a mut dyn FnMut(usize, &Hit) -> bool);
+
+impl Kernel for Together<'_> {
+    type Output = [Option<Hit>; BEAM];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> [Option<Hit>; BEAM] {
+        let Self(tree, beam, passes) = self;
+        STACKS.with_borrow_mut(|(entries, ids)| beam::closest(s, tree, beam, (entries, ids), passes))
     }
 }
 

@@ -262,6 +262,33 @@ fn all_forms_answer_bit_for_bit() {
 }
 
 #[test]
+fn rays_together_meet_what_they_meet_alone() {
+    let mut random = Random(8);
+    let scene = scene_of(soup(1200, &mut random), Mat4::IDENTITY);
+    let bvh = Bvh::build(&scene, &|_| true);
+    let (mut together, mut hits) = (0, 0);
+    for i in 0..1500 {
+        let (o, d) = (random.point() * 1.5, random.direction());
+        let spread = [0.0, 1e-4, 0.02, 0.3][i % 4];
+        let count = 1 + i % BEAM;
+        let mut ray = || {
+            let mut ray = Ray::new(o, (d + random.direction() * spread).normalize());
+            (ray.t_min, ray.t_max) = if i % 3 == 0 { (random.next() * 0.2, random.next() * 2.0) } else { (0.0, f32::INFINITY) };
+            ray
+        };
+        let rays: Vec<Ray> = (0..count).map(|_| ray()).collect();
+        together += usize::from(Beam::new(&rays).is_some());
+        let mut found = [None; BEAM];
+        bvh.closest_of(&scene, &rays, &mut found);
+        for (k, ray) in rays.iter().enumerate() {
+            assert_eq!(found[k], bvh.closest(&scene, ray), "ray {k} of {i}");
+        }
+        hits += found.iter().flatten().count();
+    }
+    assert!((700..1500).contains(&together) && hits > 3000, "{together} beams, {hits} hits");
+}
+
+#[test]
 fn deep_trees_fit_their_stack() {
     // Boxes in boxes, each a little larger than the one before: a tree as deep as it can get.
     let mut mesh = Mesh::default();

@@ -44,11 +44,11 @@ struct Axes {
 }
 
 /// What stays the same from pass to pass, a pixel an entry.
-struct Guides {
+struct Guides<'a> {
     axes: Vec<Axes>,
     /// Normal and depth.
     surface: Vec<[f32; 4]>,
-    material: Vec<u32>,
+    material: &'a [u32],
 }
 
 /// Filters a frame.
@@ -71,8 +71,7 @@ pub(super) fn four_pass_by(lanes: Lanes, input: &FilterInput, params: &FilterPar
         let w = confidence(input, i, params);
         if w > 0.0 { (input.color[i] * w).extend(w).to_array() } else { [0.0; 4] }
     };
-    let guides =
-        Guides { axes: rows().map(axes).collect(), surface: rows().map(surface).collect(), material: input.material.to_vec() };
+    let guides = Guides { axes: rows().map(axes).collect(), surface: rows().map(surface).collect(), material: input.material };
     let start: Vec<[f32; 4]> = rows().map(start).collect();
     let mut out = vec![Rgb::ZERO; count];
     let mut spare = vec![[0.0; 4]; count];
@@ -119,7 +118,7 @@ struct Strip<'a> {
     /// Index of the first pixel.
     first: usize,
     params: &'a FilterParams,
-    guides: &'a Guides,
+    guides: &'a Guides<'a>,
     from: &'a [[f32; 4]],
     out: &'a mut [[f32; 4]],
     kernel: (bool, f32),
@@ -154,7 +153,7 @@ struct Image<'a, S: Simd> {
     width: usize,
     height: usize,
     params: &'a FilterParams,
-    guides: &'a Guides,
+    guides: &'a Guides<'a>,
     from: &'a [f32],
 }
 
@@ -222,7 +221,7 @@ impl<S: Simd> Image<'_, S> {
         let normal = V3 { x: F8(s, nx), y: F8(s, ny), z: F8(s, nz) };
         let near = (own.depth - F8(s, depth)).abs().below(self.params.depth_threshold);
         let facing = own.normal.dot(normal).above(self.params.min_normal_cos);
-        let same = M8(s, s.same_ids(own.material, s.ones(&self.guides.material, index)));
+        let same = M8(s, s.same_ids(own.material, s.ones(self.guides.material, index)));
         let weight = (counts & near & facing & same).choose(weight, F8::splat(s, 0.0));
         let [r, g, b, w] = s.fours(self.from, at);
         sum.weight = sum.weight + weight;
