@@ -43,7 +43,7 @@ pub fn acos<S: Simd>(c: F8<S>) -> F8<S> {
     let half = (a * -1.0 + 1.0) * 0.5;
     let z = near.choose(half, a * a);
     let x = near.choose(half.sqrt(), a);
-    let c5 = [4.216_32e-2, 2.418_131_1e-2, 4.547_002_6e-2, 7.495_300_3e-2, 1.666_675_2e-1];
+    let c5 = [4.216_32e-2, 2.418_131e-2, 4.547_002_6e-2, 7.495_300_3e-2, 1.666_675_2e-1];
     let asin = polynomial(z, c5) * z * x + x;
     let positive = near.choose(asin + asin, asin * -1.0 + FRAC_PI_2);
     c.below(0.0).choose(positive * -1.0 + PI, positive)

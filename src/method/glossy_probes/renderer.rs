@@ -114,14 +114,10 @@ impl<'a> Renderer<'a> {
         let size = fine.size.map(|s| s as usize);
         let mut clock = Clock::start();
 
-        let near: Vec<_> = probes
-            .set
-            .places
-            .nearest(camera.position(), self.params.gather.probes)
-            .into_iter()
-            .map(|(index, t)| Ok((index, probes.probe(index)?, self.params.gather.probe_weight(t))))
-            .collect::<Result<_>>()?;
-        let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
+        let places = probes.set.places.nearest(camera.position(), self.params.gather.probes);
+        let read = probes.probes(&places.iter().map(|(index, _)| *index).collect::<Vec<_>>())?;
+        let weight = |t: f32| self.params.gather.probe_weight(t);
+        let near: Vec<_> = places.iter().zip(&read).map(|((index, t), probe)| (*index, &**probe, weight(*t))).collect();
         let roughness_scale = probes.set.roughness_scale;
         let albedos = self.params.gather.albedo_ratio.then_some(roughness_scale);
         let mirrors = self.lightmap.filter(|_| self.params.mirror_light && probes.set.mirrored);
