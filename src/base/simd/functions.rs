@@ -91,7 +91,7 @@ mod tests {
             assert!(all.iter().all(|found| found.map(|f| f.map(f32::to_bits)) == all[0].map(|f| f.map(f32::to_bits))));
             for k in 0..8 {
                 let (y, x) = (f64::from(a[k]), f64::from(b[k]));
-                let expected = [y.atan2(x), y.clamp(-1.0, 1.0).acos(), (-20.0 * y.abs()).exp()];
+                let expected = [y.atan2(x), y.clamp(-1.0, 1.0).acos(), f64::from(a[k].abs() * -20.0).exp()];
                 for (found, expected) in all[0].iter().zip(expected) {
                     let error = (f64::from(found[k]) - expected).abs();
                     assert!(
