@@ -1,4 +1,4 @@
-// The search for what a probe saw of what a pixel reflects (§5.1). Twin: src/method/glossy_probes/gather.rs.
+// The search for what a probe saw of what a pixel reflects (§5.2). Twin: src/method/glossy_probes/window.rs, for one pixel and one texel at a time.
 
 // #include "glossy_probes/perturb.wgsl"
 // #include "shared/view.wgsl"

@@ -61,6 +61,19 @@ pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
     n * (2.0 * n.dot(w)) - w
 }
 
+/// Unit direction, with x not below 0, of the larger eigenvalue of a symmetric matrix [[m + `half`, `xy`], [`xy`, m - `half`]], where `radius` is
+/// the length of (`half`, `xy`): half the angle of that vector, without asking for the angle. The x axis where there is no larger one.
+pub fn major_axis(half: f32, xy: f32, radius: f32) -> Vec2 {
+    if !(radius > 0.0 && radius.is_finite()) {
+        return Vec2::X;
+    }
+    // The larger of cosine and sine, from the cosine of twice the angle; the other from the sine of that.
+    let larger = (0.5 * (1.0 + half.abs() / radius)).sqrt();
+    let smaller = 0.5 * xy.abs() / (radius * larger);
+    let (c, s) = if half >= 0.0 { (larger, smaller) } else { (smaller, larger) };
+    Vec2::new(c, s.copysign(xy))
+}
+
 /// Uniform number in [0, 1) of the upper 24 of random bits.
 pub fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
@@ -130,6 +143,21 @@ mod tests {
             let back = lat_long_from_direction(direction_from_lat_long(uv));
             assert!((back - uv).abs().max_element() < 1e-4, "{uv} -> {back}");
         }
+    }
+
+    #[test]
+    fn the_major_axis_has_half_the_angle() {
+        for i in 0..2000 {
+            let angle = (i as f32 * 0.618_034).fract() * TAU - PI;
+            let (half, xy) = (angle.cos() * 3.0, angle.sin() * 3.0);
+            let found = major_axis(half, xy, half.hypot(xy));
+            let expected = Vec2::from_angle(0.5 * xy.atan2(half));
+            assert!((found - expected).length() < 3e-7, "{angle}: {found}, not {expected}");
+        }
+        for (half, xy) in [(0.0, 0.0), (f32::NAN, 1.0), (f32::INFINITY, 1.0)] {
+            assert_eq!(major_axis(half, xy, half.hypot(xy)), Vec2::X);
+        }
+        assert_eq!((major_axis(1.0, 0.0, 1.0), major_axis(-1.0, 0.0, 1.0)), (Vec2::X, Vec2::Y));
     }
 
     #[test]

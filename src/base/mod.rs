@@ -1,4 +1,4 @@
-//! What every room stands on: small geometry, rays, errors, progress, clocks.
+//! What every room stands on: small geometry, lanes, rays, errors, progress, clocks.
 
 pub mod clock;
 pub mod error;
@@ -7,3 +7,4 @@ pub mod named;
 pub mod prefetch;
 pub mod progress;
 pub mod ray;
+pub mod simd;

@@ -1,6 +1,7 @@
 //! `timings.json`: milliseconds a pass and frame, and memory. Kept apart from the frames, whose bits must not depend on it.
 
 use crate::base::clock::timed;
+use crate::base::simd::Lanes;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,6 +13,9 @@ pub struct Timings {
     pub method: String,
     /// Worker threads.
     pub threads: usize,
+    /// Instruction set that the CPU's lanes were of ([`Lanes::name`]).
+    #[serde(default)]
+    pub simd: String,
     /// The GPU that frames were made on; `None` for the CPU.
     pub device: Option<String>,
     /// Whose clock the passes on the GPU were timed by: "gpu", or "cpu" for the host's, which includes handing them over.
@@ -63,7 +67,13 @@ pub struct FrameTimings {
 impl Timings {
     /// Of a method, on the CPU, with nothing timed as yet.
     pub fn of(method: &str) -> Self {
-        Self { method: method.into(), threads: rayon::current_num_threads(), clock: "cpu".into(), ..Self::default() }
+        Self {
+            method: method.into(),
+            threads: rayon::current_num_threads(),
+            simd: Lanes::chosen().name().into(),
+            clock: "cpu".into(),
+            ..Self::default()
+        }
     }
 
     /// Notes the bytes that probes take, in the host's memory and on the GPU, where they are the most so far.

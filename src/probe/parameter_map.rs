@@ -107,8 +107,12 @@ impl ParameterMap {
     pub fn search_scale(&self, texel: Vec2) -> Vec2 {
         let half = UVec2::from(half_size(self.size));
         let p = (texel * 0.5).max(Vec2::ZERO).as_uvec2().min(half - 1);
-        let [x, y] = self.derivative[(p.y * half.x + p.x) as usize].map(f16::to_f32);
-        Vec2::new(x, y).max(Vec2::splat(DERIVATIVE_MIN)).recip()
+        scale(&self.derivative[(p.y * half.x + p.x) as usize])
+    }
+
+    /// All of those factors, at half the probe's resolution (rounded up).
+    pub fn search_scales(&self) -> impl Iterator<Item = Vec2> {
+        self.derivative.iter().map(scale)
     }
 
     /// Log of texel density, relative to plain lat-long, in each quad of the mesh: ln of the area that the quad's image takes.
@@ -202,6 +206,10 @@ pub(crate) fn quad_area([a, b, c, d]: [Vec2; 4]) -> f32 {
 pub fn count_flipped(mesh: [u32; 2], forward: &[Vec2]) -> usize {
     let turns = |q: [Vec2; 4]| (0..4).all(|k| (q[(k + 1) % 4] - q[k]).perp_dot(q[(k + 3) % 4] - q[k]) > 0.0);
     quads(mesh).filter(|q| !turns(q.map(|i| forward[i]))).count()
+}
+
+fn scale(derivative: &[f16; 2]) -> Vec2 {
+    Vec2::from(derivative.map(f16::to_f32)).max(Vec2::splat(DERIVATIVE_MIN)).recip()
 }
 
 fn half_size(size: [u32; 2]) -> [u32; 2] {

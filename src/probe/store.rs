@@ -8,6 +8,7 @@ use crate::io::{Provenance, json};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use glam::Vec3;
+use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -61,13 +62,38 @@ impl<Served: DeserializeOwned> ProbeStore<Served> {
             return Ok(probe.clone());
         }
         let probe = Arc::new(self.read(index)?);
+        self.keep(index, probe.clone());
+        Ok(probe)
+    }
+
+    /// Several of them; those that are not in memory are read side by side.
+    pub fn probes(&mut self, indices: &[usize]) -> Result<Vec<Arc<Probe>>>
+    where
+        Served: Sync,
+    {
+        self.clock += 1;
+        let mut missing = Vec::new();
+        for &index in indices {
+            match self.resident.get_mut(&index) {
+                Some((used, _)) => *used = self.clock,
+                None => missing.push(index),
+            }
+        }
+        let read: Vec<Result<Probe>> = missing.par_iter().map(|&index| self.read(index)).collect();
+        for (index, probe) in missing.into_iter().zip(read) {
+            self.keep(index, Arc::new(probe?));
+        }
+        indices.iter().map(|&index| self.probe(index)).collect()
+    }
+
+    /// Keeps a probe in place of the one used longest ago.
+    fn keep(&mut self, index: usize, probe: Arc<Probe>) {
         if self.resident.len() >= self.capacity
             && let Some(oldest) = self.resident.iter().min_by_key(|(_, (used, _))| *used).map(|(i, _)| *i)
         {
             self.resident.remove(&oldest);
         }
-        self.resident.insert(index, (self.clock, probe.clone()));
-        Ok(probe)
+        self.resident.insert(index, (self.clock, probe));
     }
 
     fn read(&self, index: usize) -> Result<Probe> {

@@ -7,7 +7,7 @@
 //! k1 = k2 = 1/R), so that moving by `s` along a principal direction turns the normal by `k s` towards that direction,
 //! and the paraboloid is z = -(k1 u² + k2 v²) / 2.
 
-use crate::base::math::Basis;
+use crate::base::math::{Basis, major_axis};
 use glam::{Mat2, Vec2, Vec3};
 
 /// Principal curvatures and directions at a point; (d1, d2, n) is a right-handed orthonormal frame.
@@ -35,8 +35,8 @@ impl Curvature {
         let mean = 0.5 * (xx + yy);
         let half = 0.5 * (xx - yy);
         let radius = half.hypot(xy);
-        let angle = if radius > 0.0 { 0.5 * xy.atan2(half) } else { 0.0 };
-        let d1 = frame.s * angle.cos() + frame.t * angle.sin();
+        let along = major_axis(half, xy, radius);
+        let d1 = frame.s * along.x + frame.t * along.y;
         Self { k1: mean + radius, k2: mean - radius, d1, d2: frame.n.cross(d1) }
     }
 

@@ -67,12 +67,19 @@ impl Facet {
         self.round.map(|r| &geometry.rounds[r.get() as usize - 1])
     }
 
+    /// Where `hit`, of this triangle, lies: [`Facet::surface`]'s point.
+    #[inline]
+    pub fn point(&self, hit: &Hit) -> Vec3 {
+        let [a, b, c] = self.corners;
+        a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
+    }
+
     /// The surface that `hit`, of this triangle, lies on.
     pub fn surface(&self, hit: &Hit) -> Surface {
         let [a, b, c] = self.corners;
         let ([na, nb, nc], [ta, tb, tc]) = (self.normals, self.uvs);
         let w = 1.0 - hit.u - hit.v;
-        let p = a * w + b * hit.u + c * hit.v;
+        let p = self.point(hit);
         let n = (na * w + nb * hit.u + nc * hit.v).try_normalize().unwrap_or(self.ng);
         let tangents = || {
             let ((e, f), (g, h)) = ((b - a, c - a), (tb - ta, tc - ta));

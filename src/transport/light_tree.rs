@@ -4,6 +4,7 @@
 //! direction and of power, put together by the surface area orientation heuristic. *Ours*: no splitting, one emitter a
 //! descent; and a surface's back counts as [`BACK`], not as nothing, so that no scattering model is ever cut off.
 
+use crate::base::simd::{Kernel, Lanes, Simd};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -148,6 +149,18 @@ impl LightTree {
     }
 }
 
+/// [`Node::shares`] of many: written for one child at a time, compiled for eight where the machine has them.
+struct Shares<'a>(&'a Node, &'a Receiver);
+
+impl Kernel for Shares<'_> {
+    type Output = [f32; WIDTH];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> [f32; WIDTH] {
+        self.0.shares_of_many(self.1)
+    }
+}
+
 impl Node {
     fn empty(parent: [u32; 2]) -> Self {
         let zero = [0.0; WIDTH];
@@ -184,19 +197,7 @@ impl Node {
             shares[0] = 1.0;
             return shares;
         }
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the machine has AVX2.
-            return unsafe { self.shares_avx2(receiver) };
-        }
-        self.shares_of_many(receiver)
-    }
-
-    /// Eight lanes where the baseline has four; the same bits.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn shares_avx2(&self, receiver: &Receiver) -> [f32; WIDTH] {
-        self.shares_of_many(receiver)
+        Lanes::chosen().run(Shares(self, receiver))
     }
 
     #[inline(always)]

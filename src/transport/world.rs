@@ -1,6 +1,6 @@
 //! A scene made ready for rays.
 
-use super::bvh::Bvh;
+use super::bvh::{BEAM, Bvh};
 use super::facet::Facet;
 use super::lights::Lights;
 use crate::base::math::Rgb;
@@ -79,6 +79,17 @@ impl World {
         }
     }
 
+    /// First hits of at most [`BEAM`] rays: each one's [`World::closest`], sooner where they begin at one point and go in much the same
+    /// direction.
+    pub fn closest_of(&self, rays: &[Ray]) -> [Option<Hit>; BEAM] {
+        let mut hits = [None; BEAM];
+        self.bvh.closest_of(&self.scene, &self.facets, rays, &mut hits);
+        if let Some(added) = &self.added {
+            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = added.closest(&self.scene, ray, *hit));
+        }
+        hits
+    }
+
     /// First surface along a ray.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Surface> {
@@ -93,7 +104,12 @@ impl World {
 
     /// The surface that a camera's ray shows: where the scene hides its emitters, the first that is none.
     pub fn seen(&self, ray: &Ray) -> Option<Surface> {
-        let mut surface = self.intersect(ray)?;
+        self.seen_from(ray, self.closest(ray))
+    }
+
+    /// [`World::seen`] of a ray whose first hit is known.
+    pub fn seen_from(&self, ray: &Ray, first: Option<Hit>) -> Option<Surface> {
+        let mut surface = self.surface(&first?);
         if !self.scene.hide_emitters {
             return Some(surface);
         }
@@ -124,6 +140,15 @@ impl World {
             surface.emitter = self.scene.geometry.objects[surface.object as usize].emitter;
         }
         surface
+    }
+
+    /// Where a hit lies: [`World::surface`]'s point.
+    pub fn point(&self, hit: &Hit) -> Vec3 {
+        let facet = self.facets.get(hit.triangle as usize).unwrap_or_else(|| self.added_facet(hit.triangle));
+        match facet.round(&self.scene.geometry) {
+            None => facet.point(hit),
+            Some(round) => facet.surface_of(round, hit).p,
+        }
     }
 
     #[cold]

@@ -2,6 +2,7 @@
 
 use super::mirror::facing_normal;
 use crate::base::math::{Rgb, hash_words};
+use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::scene::Camera;
@@ -9,6 +10,7 @@ use crate::surface::{Curvature, CurvatureMap};
 use crate::transport::World;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::mem::MaybeUninit;
 
 /// What the later passes need to know of a pixel.
 #[derive(Debug, Clone, Copy)]
@@ -56,22 +58,61 @@ impl GBuffer {
     }
 }
 
+/// Side of the squares of pixels whose rays are followed together.
+const BLOCK: usize = 4;
+
 /// Casts the camera's rays.
 pub fn gbuffer(world: &World, curvature: &CurvatureMap, camera: &Camera) -> GBuffer {
+    gbuffer_in(world, curvature, camera, None)
+}
+
+/// [`gbuffer`], in the room of another that is no longer needed: memory that the system has to clear first takes as long as the rays.
+pub fn gbuffer_in(world: &World, curvature: &CurvatureMap, camera: &Camera, room: Option<GBuffer>) -> GBuffer {
     let [width, height] = camera.size.map(|s| s as usize);
-    let (pixels, background) = (0..width * height)
-        .into_par_iter()
-        .with_min_len(width)
-        .map(|i| {
-            let centre = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
-            let ray = camera.ray(centre, Vec2::splat(0.5));
-            match world.seen(&ray) {
-                Some(surface) => (Some(pixel(world, curvature, surface, -ray.d)), Rgb::ZERO),
-                None => (None, world.backdrop(ray.d)),
+    let count = width * height;
+    let (mut pixels, mut background) = room.map_or_else(Default::default, |room| (room.pixels, room.background));
+    pixels.clear();
+    background.clear();
+    pixels.reserve_exact(count);
+    background.reserve_exact(count);
+    let of_strip = |(strip, (pixels, background)): (usize, (&mut [MaybeUninit<_>], &mut [MaybeUninit<_>]))| {
+        for left in (0..width).step_by(BLOCK) {
+            for (at, ray, hit) in block(world, camera, [left, strip * BLOCK]) {
+                let (seen, behind) = match world.seen_from(&ray, hit) {
+                    Some(surface) => (Some(pixel(world, curvature, surface, -ray.d)), Rgb::ZERO),
+                    None => (None, world.backdrop(ray.d)),
+                };
+                pixels[at - strip * BLOCK * width].write(seen);
+                background[at - strip * BLOCK * width].write(behind);
             }
-        })
-        .unzip();
+        }
+    };
+    let rows = BLOCK * width.max(1);
+    let strips = pixels.spare_capacity_mut()[..count].par_chunks_mut(rows);
+    strips.zip(background.spare_capacity_mut()[..count].par_chunks_mut(rows)).enumerate().for_each(of_strip);
+    // SAFETY: the blocks of a strip hold each of its pixels once, and the strips are all there are.
+    unsafe {
+        pixels.set_len(count);
+        background.set_len(count);
+    }
     GBuffer { camera: camera.clone(), pixels, background }
+}
+
+/// The pixels of a square, by index, with their rays and what these meet first. Followed together they share the way through the tree.
+fn block(world: &World, camera: &Camera, [left, top]: [usize; 2]) -> impl Iterator<Item = (usize, Ray, Option<Hit>)> {
+    let [width, height] = camera.size.map(|s| s as usize);
+    let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); BLOCK * BLOCK];
+    let mut at = [0; BLOCK * BLOCK];
+    let mut count = 0;
+    for y in top..(top + BLOCK).min(height) {
+        for x in left..(left + BLOCK).min(width) {
+            let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            (rays[count], at[count]) = (camera.ray(centre, Vec2::splat(0.5)), y * width + x);
+            count += 1;
+        }
+    }
+    let hits = world.closest_of(&rays[..count]);
+    (0..count).map(move |i| (at[i], rays[i], hits[i]))
 }
 
 fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) -> Pixel {

@@ -82,7 +82,7 @@ pub fn mirror_hit(world: &World, surface: &Surface, wo: Vec3) -> Reflected {
     match world.closest(&surface.spawn(d)) {
         Some(hit) => {
             let geometry = &world.scene.geometry;
-            Reflected { point: world.surface(&hit).p, material: geometry.object(hit.triangle).material as u16 }
+            Reflected { point: world.point(&hit), material: geometry.object(hit.triangle).material as u16 }
         }
         None => Reflected { point: d, material: SKY },
     }

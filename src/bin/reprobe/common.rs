@@ -2,6 +2,7 @@
 
 use crate::terminal::Terminal;
 use anyhow::{Context as _, bail};
+use reprobe::base::simd::Lanes;
 use reprobe::exchange::LoadOptions;
 use reprobe::gpu::Choice;
 use reprobe::plan::{Context, Outcome};
@@ -83,8 +84,9 @@ pub fn hide_idle(mut cli: clap::Command) -> clap::Command {
 }
 
 impl Common {
-    /// Sets up the thread pool.
+    /// Sets up the thread pool. An error where the environment asks for an instruction set that is none.
     pub fn start(&self) -> anyhow::Result<()> {
+        Lanes::asked()?;
         if let Some(n) = self.threads {
             if !(1..=MOST_THREADS).contains(&n) {
                 bail!("--threads {n}: expected 1 to {MOST_THREADS}");

@@ -7,7 +7,7 @@ use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
 use crate::transport::World;
 use crate::view::mirror::Reflected;
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -23,6 +23,9 @@ pub struct Candidates {
     pub directions: Vec<Directions>,
     /// What is fetched in the end.
     pub light: Vec<Light>,
+    /// [`crate::probe::parameter_map::ParameterMap::search_scale`] at half the probe's resolution, and one more, so that two can be read of the
+    /// last; not on a GPU.
+    pub(crate) scale: Vec<Vec2>,
 }
 
 /// A probe that takes part.
@@ -112,6 +115,7 @@ impl Candidates {
             seen: with_reflectors().map(seen).collect(),
             directions: with_reflectors().map(directions).collect(),
             light: with_reflectors().map(light).collect(),
+            scale: probe.map.search_scales().chain([Vec2::ONE]).collect(),
         }
     }
 }

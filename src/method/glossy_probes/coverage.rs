@@ -8,16 +8,18 @@
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::base::named::within;
-use crate::base::ray::Ray;
+use crate::base::ray::{Hit, Ray};
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
 use crate::transport::World;
+use crate::transport::bvh::BEAM;
 use crate::view::gbuffer::{GBuffer, Pixel, view_alpha};
 use crate::view::mirror::{Reflected, facing_normal, mirror_hit};
 use crate::view::mirror_light::mirror_light;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Parameters of the antialiasing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,22 +76,57 @@ pub struct Covered {
 }
 
 /// What decides whether two rays see the same.
+#[derive(Clone, Copy)]
 struct Shown {
     p: Vec3,
-    normal: Vec3,
     depth: f32,
-    alpha: Option<f32>,
+    normal: Vec3,
+    /// [`NOTHING_SEEN`] for the environment.
     material: u32,
+    /// Negative where the surface has no glossy lobe.
+    alpha: f32,
+    reflected: Reflected,
 }
 
+/// [`Shown::material`] of what shows no surface.
+const NOTHING_SEEN: u32 = u32::MAX;
+
 impl Shown {
-    fn of(p: &Pixel) -> Self {
-        let Pixel { surface, normal, depth, alpha, .. } = *p;
-        Self { p: surface.p, normal, depth, alpha, material: surface.material }
+    fn of(pixel: &Option<Pixel>, reflected: &Reflected) -> Self {
+        match pixel {
+            Some(p) => Self {
+                p: p.surface.p,
+                depth: p.depth,
+                normal: p.normal,
+                material: p.surface.material,
+                alpha: p.alpha.unwrap_or(-1.0),
+                reflected: *reflected,
+            },
+            None => Self {
+                p: Vec3::ZERO,
+                depth: 0.0,
+                normal: Vec3::ZERO,
+                material: NOTHING_SEEN,
+                alpha: -1.0,
+                reflected: Reflected::NONE,
+            },
+        }
+    }
+
+    fn is_glossy(&self) -> bool {
+        self.alpha >= 0.0
     }
 
     fn is_sharp(&self) -> bool {
-        self.alpha.is_some_and(|alpha| alpha <= SHARP_ALPHA)
+        self.is_glossy() && self.alpha <= SHARP_ALPHA
+    }
+
+    /// Whether the two are on either side of an edge.
+    fn differs(&self, other: &Self) -> bool {
+        if self.material == NOTHING_SEEN || other.material == NOTHING_SEEN {
+            return self.material != other.material;
+        }
+        !(self.same_surface(other) && self.same_reflected(&other.reflected))
     }
 
     fn same_surface(&self, other: &Self) -> bool {
@@ -99,10 +136,14 @@ impl Shown {
             && self.normal.dot(other.p - self.p).abs() < DEPTH_TOLERANCE * self.depth
     }
 
-    /// Whether two mirror hits, `a` from here, are the same; of no account where the surface is rough.
-    fn same_reflected(&self, a: &Reflected, b: &Reflected) -> bool {
+    /// Whether another mirror hit is the same as that from here; of no account where the surface is rough.
+    fn same_reflected(&self, b: &Reflected) -> bool {
+        if !self.is_sharp() {
+            return true;
+        }
+        let a = &self.reflected;
         let reach = if a.is_sky() { 1.0 } else { a.point.distance(self.p) + self.depth };
-        !self.is_sharp() || (a.material == b.material && a.point.distance(b.point) < REFLECTED_TOLERANCE * reach)
+        a.material == b.material && a.point.distance(b.point) < REFLECTED_TOLERANCE * reach
     }
 }
 
@@ -117,27 +158,62 @@ pub fn covered_pixels(
     params: &CoverageParams,
 ) -> Vec<(usize, Covered)> {
     let [width, height] = camera.size.map(|s| s as usize);
+    if params.rays == 0 {
+        return Vec::new();
+    }
     let scene = Lit { world, lightmap, mirrors };
-    let of = |i: usize| {
-        let window = window(sub, [i % width, i / width]);
-        if params.rays == 0 || !has_edge(sub, &window) {
-            return None;
+    let strip = |first: usize| {
+        let rows = first..(first + ROWS).min(height);
+        let shown = Strip::new(sub, rows.clone());
+        let mut covered = Vec::new();
+        for (x, y) in rows.flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let window = shown.window([x, y]);
+            if has_edge(&shown, &window) {
+                covered.push((y * width + x, scene.pixel(camera, params.rays * params.rays, [x, y], &shown, &window)));
+            }
         }
-        let corner = Vec2::new((i % width) as f32, (i / width) as f32);
-        let rays = params.rays * params.rays;
-        let mut sum = Covered::default();
-        for k in 0..rays {
-            let at = corner + lattice_point(k, rays);
-            let seen = scene.along(&camera.ray(at, Vec2::splat(0.5)), sub, &window, at * sub.n as f32);
-            sum.emission += seen.emission;
-            sum.diffuse += seen.diffuse;
-            sum.glossy += seen.glossy;
-        }
-        let scale = 1.0 / rays as f32;
-        let glossy = (sum.glossy * scale).max(Rgb::ZERO);
-        Some((i, Covered { emission: sum.emission * scale, diffuse: sum.diffuse * scale, glossy }))
+        covered
     };
-    (0..width * height).into_par_iter().with_min_len(width).filter_map(of).collect()
+    (0..height.div_ceil(ROWS)).into_par_iter().flat_map_iter(|k| strip(k * ROWS)).collect()
+}
+
+/// Rows of a task.
+const ROWS: usize = 8;
+
+/// What the sub-pixels of some rows show, and of those next to them.
+struct Strip<'a> {
+    sub: &'a SubPixels<'a>,
+    /// Sub-pixels in a row.
+    width: usize,
+    /// The first row of sub-pixels that is here.
+    first: usize,
+    shown: Vec<Shown>,
+}
+
+/// Columns and rows of sub-pixels.
+type Window = [Range<usize>; 2];
+
+impl<'a> Strip<'a> {
+    fn new(sub: &'a SubPixels, rows: Range<usize>) -> Self {
+        let [width, height] = sub.view.size();
+        let around = (rows.start * sub.n).saturating_sub(1)..(rows.end * sub.n + 1).min(height);
+        let all = around.start * width..around.end * width;
+        let shown = sub.view.pixels[all.clone()].iter().zip(&sub.reflected[all]).map(|(p, r)| Shown::of(p, r)).collect();
+        Self { sub, width, first: around.start, shown }
+    }
+
+    /// The sub-pixels of a pixel and those around it.
+    fn window(&self, [x, y]: [usize; 2]) -> Window {
+        let (n, [width, height]) = (self.sub.n, self.sub.view.size());
+        let range = |p: usize, most: usize| (p * n).saturating_sub(1)..((p + 1) * n + 1).min(most);
+        [range(x, width), range(y, height)]
+    }
+
+    /// A row of sub-pixels.
+    fn row(&self, y: usize) -> &[Shown] {
+        let start = (y - self.first) * self.width;
+        &self.shown[start..start + self.width]
+    }
 }
 
 pub(crate) const GOLDEN_RATIO: f32 = 0.618_034;
@@ -156,10 +232,35 @@ struct Lit<'a> {
 }
 
 impl Lit<'_> {
-    /// What a ray through `at` (sub-pixels) shows.
-    fn along(&self, ray: &Ray, sub: &SubPixels, window: &[usize], at: Vec2) -> Covered {
+    /// What a pixel shows along so many rays.
+    fn pixel(&self, camera: &Camera, rays: u32, [x, y]: [usize; 2], shown: &Strip, window: &Window) -> Covered {
+        let corner = Vec2::new(x as f32, y as f32);
+        let mut sum = Covered::default();
+        let place = |k: u32| corner + lattice_point(k, rays);
+        for first in (0..rays).step_by(BEAM) {
+            let count = (rays - first).min(BEAM as u32) as usize;
+            let beam: [Ray; BEAM] = std::array::from_fn(|i| {
+                let k = first + i.min(count - 1) as u32;
+                camera.ray(place(k), Vec2::splat(0.5))
+            });
+            let hits = self.world.closest_of(&beam[..count]);
+            for (i, (ray, hit)) in beam[..count].iter().zip(hits).enumerate() {
+                let at = place(first + i as u32) * shown.sub.n as f32;
+                let seen = self.along((ray, hit), shown, window, at);
+                sum.emission += seen.emission;
+                sum.diffuse += seen.diffuse;
+                sum.glossy += seen.glossy;
+            }
+        }
+        let scale = 1.0 / rays as f32;
+        let glossy = (sum.glossy * scale).max(Rgb::ZERO);
+        Covered { emission: sum.emission * scale, diffuse: sum.diffuse * scale, glossy }
+    }
+
+    /// What a ray through `at` (sub-pixels), whose first hit is known, shows.
+    fn along(&self, (ray, hit): (&Ray, Option<Hit>), shown: &Strip, window: &Window, at: Vec2) -> Covered {
         let Self { world, lightmap, mirrors } = *self;
-        let Some(surface) = world.seen(ray) else {
+        let Some(surface) = world.seen_from(ray, hit) else {
             return Covered { emission: world.backdrop(ray.d), ..Covered::default() };
         };
         let wo = -ray.d;
@@ -169,48 +270,38 @@ impl Lit<'_> {
             return Covered { emission, diffuse, glossy: Rgb::ZERO };
         };
         let (p, normal) = (surface.p, facing_normal(&surface, wo));
-        let seen = Shown { p, normal, depth: surface.t, alpha: Some(alpha), material: surface.material };
-        let (mirrored, light) = match lightmap.filter(|_| mirrors && alpha == 0.0) {
+        let (reflected, light) = match lightmap.filter(|_| mirrors && alpha == 0.0) {
             Some(map) => mirror_light(world, map, &surface, wo),
-            None if seen.is_sharp() => (mirror_hit(world, &surface, wo), Rgb::ZERO),
+            None if alpha <= SHARP_ALPHA => (mirror_hit(world, &surface, wo), Rgb::ZERO),
             None => (Reflected::NONE, Rgb::ZERO),
         };
-        Covered { emission, diffuse, glossy: light + glossy_of(sub, window, &seen, &mirrored, at) }
+        let seen = Shown { p, normal, depth: surface.t, alpha, material: surface.material, reflected };
+        Covered { emission, diffuse, glossy: light + glossy_of(shown, window, &seen, at) }
     }
 }
 
-/// The sub-pixels of a pixel and those around it.
-fn window(sub: &SubPixels, [x, y]: [usize; 2]) -> Vec<usize> {
-    let [width, height] = sub.view.size();
-    let range = |p: usize, most: usize| (p * sub.n).saturating_sub(1)..((p + 1) * sub.n + 1).min(most);
-    range(y, height).flat_map(|y| range(x, width).map(move |x| y * width + x)).collect()
-}
-
-fn has_edge(sub: &SubPixels, window: &[usize]) -> bool {
-    let seen = |i: usize| sub.view.pixels[i].as_ref().map(Shown::of);
-    let Some((&first, rest)) = window.split_first() else { return false };
-    let (a, mirrored) = (seen(first), &sub.reflected[first]);
-    rest.iter().any(|&i| match (&a, &seen(i)) {
-        (None, None) => false,
-        (Some(a), Some(b)) => !(a.same_surface(b) && a.same_reflected(mirrored, &sub.reflected[i])),
-        _ => true,
-    })
+/// Whether what lies in a window is not all the same.
+fn has_edge(strip: &Strip, [columns, rows]: &Window) -> bool {
+    let first = &strip.row(rows.start)[columns.start];
+    rows.clone().any(|y| strip.row(y)[columns.clone()].iter().any(|other| first.differs(other)))
 }
 
 /// The glossy radiance of what a ray at `at` (sub-pixels) sees: that of the sub-pixels that show the same, the nearest most.
-fn glossy_of(sub: &SubPixels, window: &[usize], seen: &Shown, mirrored: &Reflected, at: Vec2) -> Rgb {
-    let width = sub.view.size()[0];
+fn glossy_of(strip: &Strip, [columns, rows]: &Window, seen: &Shown, at: Vec2) -> Rgb {
     // Same surface and reflection; same surface; whatever is nearest.
     let mut best = [(Rgb::ZERO, 0.0f32); 3];
-    for &i in window {
-        let Some(other) = sub.view.pixels[i].as_ref().filter(|p| p.alpha.is_some()) else { continue };
-        let centre = Vec2::new((i % width) as f32, (i / width) as f32) + 0.5;
-        let weight = 1.0 / (centre.distance_squared(at) + 0.1);
-        let surface = seen.same_surface(&Shown::of(other));
-        let reflection = surface && seen.same_reflected(mirrored, &sub.reflected[i]);
+    for (x, y) in rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y))) {
+        let other = &strip.row(y)[x];
+        if !other.is_glossy() {
+            continue;
+        }
+        let glossy = strip.sub.glossy[y * strip.width + x];
+        let weight = 1.0 / ((Vec2::new(x as f32, y as f32) + 0.5).distance_squared(at) + 0.1);
+        let surface = seen.same_surface(other);
+        let reflection = surface && seen.same_reflected(&other.reflected);
         for (k, counts) in [reflection, surface, true].into_iter().enumerate() {
             if counts {
-                best[k].0 += sub.glossy[i] * weight;
+                best[k].0 += glossy * weight;
                 best[k].1 += weight;
             }
         }

@@ -5,12 +5,14 @@
 //!
 //! *Ours*: colour is fetched at the fractional coordinate, geometry at the texel that holds it.
 
+use super::blend::blend;
 use super::candidates::WeightedProbe;
 use super::perturb::PerturbParams;
-use super::search::{MAX_RADIUS, Sample, TILE, best_samples, tiles};
+use super::search::{BestSamples, MAX_RADIUS, TILE, tile};
 use crate::Result;
-use crate::base::math::{Rgb, floor, fraction};
+use crate::base::math::{Rgb, floor};
 use crate::base::named::within;
+use crate::base::simd::{Kernel, Lanes, Simd};
 use crate::material::bsdf::{Lobes, Query};
 use crate::probe::file::Probe;
 use crate::transport::World;
@@ -174,84 +176,58 @@ pub fn gather(
     roughness_scale: f32,
     params: &GatherParams,
 ) -> Vec<Gathered> {
-    let eye = view.camera.position();
-    let tiles = tiles(view, reflected);
-    let gathered: Vec<Vec<Gathered>> = tiles
-        .par_iter()
-        .map(|tile| {
-            let samples = best_samples(eye, reflected, (tile.as_slice(), view.size()[0]), probes, params);
-            let blended = tile.iter().zip(&samples).map(|((_, p), s)| blend(world, p, s, probes, roughness_scale, params));
-            blended.collect()
-        })
-        .collect();
-    let mut image = vec![Gathered::NONE; view.pixels.len()];
-    for ((i, _), g) in tiles.iter().flatten().zip(gathered.iter().flatten()) {
-        image[*i] = *g;
-    }
-    image
+    gather_by(Lanes::chosen(), (world, view, reflected), probes, roughness_scale, params)
 }
 
-/// Eq. 2.
-fn blend(
-    world: &World,
-    pixel: &Pixel,
-    samples: &[Option<Sample>; 8],
+/// [`gather`] in one form of lanes.
+fn gather_by(
+    lanes: Lanes,
+    (world, view, reflected): (&World, &GBuffer, &[Reflected]),
     probes: &[WeightedProbe],
     roughness_scale: f32,
     params: &GatherParams,
-) -> Gathered {
-    let found = || probes.iter().zip(samples).filter_map(|(w, s)| s.map(|s| (w, s)));
-    let Some((nearest, best)) = found().min_by(|a, b| a.1.energy.total_cmp(&b.1.energy)) else {
-        return Gathered::NONE;
-    };
-    // exp(-φ E_min) is cancelled against Z, so that it cannot underflow.
-    let (mut sum, mut z) = (Rgb::ZERO, 0.0);
-    let albedo = params.albedo_ratio.then(|| view_albedo(world, pixel, roughness_scale));
-    for (w, sample) in found() {
-        let weight = w.weight * (-params.falloff * (sample.energy - best.energy)).exp();
-        let mut color = fetch(w, sample.texel, params.bilinear);
-        if let Some(view) = albedo {
-            color *= albedo_ratio(view, w, sample.texel);
+) -> Vec<Gathered> {
+    let (eye, [width, _]) = (view.camera.position(), view.size());
+    let mut image = vec![Gathered::NONE; view.pixels.len()];
+    image.par_chunks_mut(width.max(1) * TILE).enumerate().for_each(|(strip, out)| {
+        for left in (0..width).step_by(TILE) {
+            let tile = tile(view, reflected, [left, strip * TILE]);
+            let albedo = |p: &Pixel| params.albedo_ratio.then(|| view_albedo(world, p, roughness_scale));
+            let search = BestSamples { eye, reflected, tile: &tile, width, probes, params };
+            let albedos = tile.iter().map(|(_, p)| albedo(p)).collect();
+            let found = lanes.run(Tile { search, albedos });
+            tile.iter().zip(found).for_each(|((i, _), g)| out[i - strip * TILE * width] = g);
         }
-        sum += color * weight;
-        z += weight;
-    }
-    Gathered { color: sum / z, energy: best.energy, best: Some((nearest.index, best.texel)) }
+    });
+    image
 }
 
-/// The texels that [`fetch`] may read for a sample: the four around it.
+/// A tile's search and what comes of it.
+struct Tile<'a> {
+    search: BestSamples<'a>,
+    /// Of each pixel, where they are asked for.
+    albedos: Vec<Option<Rgb>>,
+}
+
+impl Kernel for Tile<'_> {
+    type Output = Vec<Gathered>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Vec<Gathered> {
+        let (probes, params) = (self.search.probes, self.search.params);
+        let samples = self.search.run(s);
+        let mut gathered = Vec::with_capacity(samples.len());
+        for (samples, albedo) in samples.iter().zip(self.albedos) {
+            gathered.push(blend(s, samples, albedo, probes, params));
+        }
+        gathered
+    }
+}
+
+/// The texels that [`blend`] may read for a sample: the four around it.
 pub fn footprint_texels(probe: &Probe, at: Vec2) -> [usize; 4] {
     let (x, y) = (floor(at.x - 0.5), floor(at.y - 0.5));
     [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| probe.index(x + i, y + j))
-}
-
-/// Colour at a fractional texel coordinate, bilinear over those of the four texels around it that `rule` lets in.
-fn fetch(w: &WeightedProbe, at: Vec2, rule: BilinearRule) -> Rgb {
-    let light = &w.candidates.light;
-    let centre = &light[w.probe.index_at(at)];
-    if rule == BilinearRule::Nearest {
-        return centre.glossy;
-    }
-    let f = fraction(at - 0.5);
-    let (mut sum, mut total) = (Rgb::ZERO, 0.0);
-    let weights = [(1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y];
-    for (i, weight) in footprint_texels(w.probe, at).into_iter().zip(weights) {
-        let tap = &light[i];
-        let same_reflected = tap.reflected_material == centre.reflected_material;
-        if tap.object == centre.object && (rule == BilinearRule::SameReflector || same_reflected) {
-            sum += tap.glossy * weight;
-            total += weight;
-        }
-    }
-    // The centre texel is among the four with a weight of at least 1/4.
-    sum / total
-}
-
-/// Directional albedo of the non-diffuse lobe in the view over that at a probe's sample, both at the probes' roughness:
-/// carries Fresnel and the specular texture over from one to the other. Clamped, as a ratio of small numbers says little.
-fn albedo_ratio(view: Rgb, w: &WeightedProbe, at: Vec2) -> Rgb {
-    let probe = w.candidates.light[w.probe.index_at(at)].albedo;
-    (view / probe.max(Rgb::splat(1e-4))).clamp(Rgb::splat(0.25), Rgb::splat(4.0))
 }
 
 /// Directional albedo of the non-diffuse lobe in the view.

@@ -7,6 +7,8 @@
 //! A frame, pass by pass: [`renderer`] is the table of contents (§5, §6). [`rays`] may be joined with it.
 
 pub mod bake;
+mod between;
+mod blend;
 pub mod candidates;
 mod cholesky;
 pub mod coverage;
@@ -19,6 +21,7 @@ pub mod gpu;
 pub mod inspect;
 pub mod lattice;
 pub mod perturb;
+mod perturb_lanes;
 pub mod previous;
 pub mod qhmap;
 pub mod quasi_harmonic;
@@ -29,6 +32,7 @@ mod row;
 pub mod search;
 pub mod seen;
 pub mod wanted;
+mod window;
 
 pub use row::{METHOD, resolve};
 

@@ -1,7 +1,7 @@
 //! Where a reflector shows a point to another eye: specular path perturbation.
 //!
 //! *Paper* (§5.1): Δx = J Δp + [Δp]ᵀ H [Δp], after Chen and Arvo 2000. *Reading*: their H is the second derivative, so the series needs
-//! the factor 1/2, which lives in [`Perturbation::reflection_point`] (`0.5 * second`).
+//! the factor 1/2, which lives in [`Paths::reflection_points`] (`second * 0.5`).
 //!
 //! Derivation. Near x the reflector is s(u) = x + T u - n uᵀKu / 2 with T = (d1, d2) and K = diag(k1, k2). Of all paths p-s-q the light takes
 //! the one of stationary length (Fermat): F(u, p) = ∂/∂u (|s - p| + |s - q|) = 0, and u is a function of p where ∂F/∂u is regular
@@ -27,9 +27,11 @@
 //! (the second-order part longer than the first) is cut there; where a concave reflector focuses the eye onto q
 //! (G singular), and for broken input, the reflector counts as a plane.
 
+use super::perturb_lanes::{Paths, Points};
 use crate::Result;
 use crate::base::math::{Basis, reflect};
 use crate::base::named::within;
+use crate::base::simd::Lanes;
 use crate::surface::Curvature;
 use glam::{Mat2, Vec2, Vec3};
 
@@ -103,17 +105,17 @@ pub fn path_hessian(e: Vec3, c: f32, k: Vec2) -> Mat2 {
 #[derive(Debug, Clone, Copy)]
 pub struct Perturbation {
     /// (d1, d2, n) at x: what follows is in these coordinates.
-    frame: Basis,
-    x: Vec3,
-    p: Vec3,
+    pub(super) frame: Basis,
+    pub(super) x: Vec3,
+    pub(super) p: Vec3,
     /// Direction from x to the eye; that to q is (-e.x, -e.y, e.z).
-    e: Vec3,
-    inv_rp: f32,
-    inv_rq: f32,
+    pub(super) e: Vec3,
+    pub(super) inv_rp: f32,
+    pub(super) inv_rq: f32,
     /// Principal curvatures.
-    k: Vec2,
-    g_inverse: Mat2,
-    params: PerturbParams,
+    pub(super) k: Vec2,
+    pub(super) g_inverse: Mat2,
+    pub(super) params: PerturbParams,
 }
 
 impl Perturbation {
@@ -140,95 +142,8 @@ impl Perturbation {
 
     /// x': where the reflector shows the same point q to the eye at `p`. Always finite for finite input.
     pub fn reflection_point(&self, p: Vec3) -> Vec3 {
-        let dp = self.frame.to_local(p - self.p);
-        let first = self.first_order(dp);
-        let (plane_first, rise) = self.plane(dp);
-        let mut u = if self.params.exact_plane { first - plane_first + plane_first / (1.0 + rise) } else { first };
-        if self.params.order == Order::Second {
-            let second = 0.5 * self.second_order(dp, first);
-            let rest = if self.params.exact_plane { second + plane_first * rise } else { second };
-            let limit = self.params.second_order_limit * first.length();
-            u += if rest.length() > limit { rest.clamp_length_max(limit) } else { rest };
-        }
-        if !u.is_finite() {
-            u = Vec2::ZERO;
-        }
-        if self.params.newton > 0 && self.k != Vec2::ZERO {
-            u = self.newton(u, self.frame.to_local(p - self.x));
-        }
-        let height = -0.5 * (self.k.x * u.x * u.x + self.k.y * u.y * u.y);
-        self.x + self.frame.to_world(Vec3::new(u.x, u.y, height))
-    }
-
-    /// The point of least |F| among `u` and the Newton steps from it, for the eye at `p` (local).
-    fn newton(&self, mut u: Vec2, p: Vec3) -> Vec2 {
-        let to_q = Vec3::new(-self.e.x, -self.e.y, self.e.z);
-        let farthest = MAX_STEP / self.k.abs().max_element();
-        let (mut best, mut least) = (u, f32::INFINITY);
-        for step in 0..=self.params.newton {
-            let bend = self.k * u;
-            let s = u.extend(-0.5 * u.dot(bend));
-            let (s1, s2) = (Vec3::new(1.0, 0.0, -bend.x), Vec3::new(0.0, 1.0, -bend.y));
-            let mut slope = Vec2::ZERO;
-            let (mut h11, mut h12, mut h22) = (0.0, 0.0, 0.0);
-            // Both ends times their inverse distance from x, as q may be at infinity.
-            for (a, inverse) in [(p - s, 1.0), (to_q - s * self.inv_rq, self.inv_rq)] {
-                let inv_length = a.length().max(MIN_DISTANCE).recip();
-                let (e, inv_r) = (a * inv_length, inverse * inv_length);
-                let along = Vec2::new(e.dot(s1), e.dot(s2));
-                slope -= along;
-                h11 += (s1.length_squared() - along.x * along.x) * inv_r + self.k.x * e.z;
-                h12 += (s1.dot(s2) - along.x * along.y) * inv_r;
-                h22 += (s2.length_squared() - along.y * along.y) * inv_r + self.k.y * e.z;
-            }
-            // On a steep slope a step in u is a longer one along the surface.
-            let size = slope.length_squared() / (1.0 + bend.length_squared());
-            if size < least {
-                (best, least) = (u, size);
-            }
-            let du = Vec2::new(h22 * slope.x - h12 * slope.y, h11 * slope.y - h12 * slope.x) / (h11 * h22 - h12 * h12);
-            if step == self.params.newton || !du.is_finite() {
-                break;
-            }
-            let (limit, length) = (farthest + 0.5 * u.length(), du.length());
-            u -= if length > limit { du * (limit / length) } else { du };
-        }
-        best
-    }
-
-    /// J Δp in the tangents.
-    fn first_order(&self, dp: Vec3) -> Vec2 {
-        let moved = self.inv_rp * (dp - self.e * self.e.dot(dp));
-        self.g_inverse * moved.truncate()
-    }
-
-    /// [Δp]ᵀ H [Δp] in the tangents, `u` being J Δp.
-    fn second_order(&self, dp: Vec3, u: Vec2) -> Vec2 {
-        let s = u.extend(0.0);
-        let delta = s - dp;
-        let e_q = Vec3::new(-self.e.x, -self.e.y, self.e.z);
-        let (ends, inverse) = ([(self.e, delta), (e_q, s)], [self.inv_rp, self.inv_rq]);
-        let mut sum = Vec2::ZERO;
-        let bend = self.k * u;
-        for ((e, v), inv_r) in ends.into_iter().zip(inverse) {
-            let along = e.dot(v);
-            let pv = inv_r * (v - e * along);
-            sum += inv_r * (2.0 * along * pv.truncate() + v.dot(pv) * e.truncate());
-            sum -= 2.0 * pv.z * bend;
-            // Tᵀ P n = -e_t cos θ / r.
-            sum += u.dot(bend) * inv_r * e.z * e.truncate();
-        }
-        -(self.g_inverse * sum)
-    }
-
-    /// The plane's J Δp, and ε: by how much the eye's way to the plane and on to q's image grows.
-    fn plane(&self, dp: Vec3) -> (Vec2, f32) {
-        let whole = self.inv_rp + self.inv_rq;
-        let first = (dp.truncate() - self.e.truncate() * (dp.z / self.e.z)) * (self.inv_rp / whole);
-        // 1 / (r_p + r_q); an eye behind the plane counts as one just before it.
-        let inv_sum = self.inv_rp * self.inv_rq / whole;
-        let rise = (dp.z / self.e.z).max(-(1.0 - 1e-3) / self.inv_rp) * inv_sum;
-        (first, rise)
+        let [x, y, z] = Lanes::chosen().run(Points { paths: &Paths::new(&[*self; 8]), p }).map(|axis| axis[0]);
+        Vec3::new(x, y, z)
     }
 
     /// Unit direction from x in which the path goes on.

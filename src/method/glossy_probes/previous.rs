@@ -3,7 +3,8 @@
 use super::gather::Gathered;
 use crate::base::math::Rgb;
 use crate::scene::Camera;
-use crate::view::gbuffer::GBuffer;
+use crate::view::gbuffer::{GBuffer, Pixel};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The last frame's view and glossy layer.
@@ -20,16 +21,18 @@ pub(crate) const DEPTH_TOLERANCE: f32 = 0.02;
 /// Fills pixels that no probe served with last frame's glossy layer, where it saw the same surface (§5.2).
 /// Returns how many pixels stay without a sample. Their energy stays infinite: they give nothing to the filter.
 pub fn reproject_previous(view: &GBuffer, gathered: &mut [Gathered], previous: Option<&Previous>) -> usize {
-    let mut unserved = 0;
-    for (pixel, out) in view.pixels.iter().zip(gathered) {
-        let Some(p) = pixel.as_ref().filter(|p| p.alpha.is_some() && out.energy.is_infinite()) else { continue };
+    let fill = |(pixel, out): (&Option<Pixel>, &mut Gathered)| {
+        let Some(p) = pixel.as_ref().filter(|p| p.alpha.is_some()) else { return 0 };
         match previous.and_then(|prev| lookup_previous(prev, &prev.view.camera, p.surface.p, p.surface.material)) {
             // It matches as well as anything at hand: an energy of 1 keeps its confidence below that of a good sample.
             Some(color) => *out = Gathered { color, energy: 1.0, best: None },
-            None => unserved += 1,
+            None => return 1,
         }
-    }
-    unserved
+        0
+    };
+    // The colours first: they are less than the view.
+    let unserved = view.pixels.par_iter().zip(gathered).with_min_len(view.size()[0]).filter(|(_, out)| out.energy.is_infinite());
+    unserved.map(fill).sum()
 }
 
 fn lookup_previous(previous: &Previous, camera: &Camera, p: glam::Vec3, material: u32) -> Option<Rgb> {

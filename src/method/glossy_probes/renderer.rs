@@ -17,10 +17,9 @@ use crate::scene::Camera;
 use crate::surface::CurvatureMap;
 use crate::transport::World;
 use crate::view::composite::{diffuse_layer, downsample, emission_layer};
-use crate::view::gbuffer::{GBuffer, Pixel, gbuffer};
+use crate::view::gbuffer::{GBuffer, Pixel, gbuffer_in};
 use crate::view::mirror::{Reflected, mirror_pass};
 use crate::view::mirror_light::{add_mirrored, mirror_light_pass};
-use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -76,6 +75,8 @@ pub struct Renderer<'a> {
     footprint: Option<Footprint>,
     candidates: NearCandidates,
     previous: Option<Previous>,
+    /// Where the next view may lie.
+    room: Option<GBuffer>,
 }
 
 impl<'a> Renderer<'a> {
@@ -97,6 +98,7 @@ impl<'a> Renderer<'a> {
             footprint,
             candidates: NearCandidates::default(),
             previous: None,
+            room: None,
         }
     }
 
@@ -112,20 +114,16 @@ impl<'a> Renderer<'a> {
         let size = fine.size.map(|s| s as usize);
         let mut clock = Clock::start();
 
-        let near: Vec<_> = probes
-            .set
-            .places
-            .nearest(camera.position(), self.params.gather.probes)
-            .into_iter()
-            .map(|(index, t)| Ok((index, probes.probe(index)?, self.params.gather.probe_weight(t))))
-            .collect::<Result<_>>()?;
-        let near: Vec<_> = near.iter().map(|(index, probe, weight)| (*index, &**probe, *weight)).collect();
+        let places = probes.set.places.nearest(camera.position(), self.params.gather.probes);
+        let read = probes.probes(&places.iter().map(|(index, _)| *index).collect::<Vec<_>>())?;
+        let weight = |t: f32| self.params.gather.probe_weight(t);
+        let near: Vec<_> = places.iter().zip(&read).map(|((index, t), probe)| (*index, &**probe, weight(*t))).collect();
         let roughness_scale = probes.set.roughness_scale;
         let albedos = self.params.gather.albedo_ratio.then_some(roughness_scale);
         let mirrors = self.lightmap.filter(|_| self.params.mirror_light && probes.set.mirrored);
         let weighted = self.candidates.of(self.world, &near, albedos, mirrors.is_some());
         clock.lap("load");
-        let view = Arc::new(gbuffer(self.world, self.curvature, &fine));
+        let view = Arc::new(gbuffer_in(self.world, self.curvature, &fine, self.room.take()));
         clock.lap("gbuffer");
         let (reflected, mirrored) = match mirrors {
             Some(map) => {
@@ -151,8 +149,10 @@ impl<'a> Renderer<'a> {
         };
         let emission = emission_layer(&view);
         let whole = mirrored.as_ref().map(|mirrored| add_mirrored(&glossy, mirrored));
-        let mut layers =
-            [&emission, &diffuse, whole.as_ref().unwrap_or(&glossy)].map(|layer| downsample(layer, size, n as usize));
+        let mut layers = [emission, diffuse, whole.unwrap_or_else(|| glossy.clone())];
+        if n > 1 {
+            layers = layers.map(|layer| downsample(&layer, size, n as usize));
+        }
         clock.lap("composite");
         let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
         for (i, c) in covered_pixels(self.world, self.lightmap, mirrored.is_some(), camera, &sub, &self.params.coverage) {
@@ -162,7 +162,8 @@ impl<'a> Renderer<'a> {
         }
         clock.lap("coverage");
         let buffers = self.inspect.then(|| Buffers::of(&view, reflected, gathered, covariance));
-        self.previous = Some(Previous { view, glossy });
+        let before = self.previous.replace(Previous { view, glossy });
+        self.room = before.and_then(|before| Arc::into_inner(before.view));
         let [emission, diffuse, glossy] = layers;
         Ok(Reprojected { emission, diffuse, glossy, passes: clock.laps, unserved, buffers })
     }
@@ -184,17 +185,27 @@ fn footprint_pass(footprint: &Footprint, view: &GBuffer, reflected: &[Reflected]
 /// The glossy filter (§6.2) over a view's gathered colours.
 pub fn filter_pass(view: &GBuffer, gathered: &[Gathered], covariance: &[[f32; 3]], params: &FilterParams) -> Vec<Rgb> {
     let [width, height] = view.size();
-    let pixels = || view.pixels.par_iter().map(Option::as_ref);
-    let material = |p: Option<&Pixel>| p.filter(|p| p.alpha.is_some()).map_or(NOT_GLOSSY, |p| p.surface.material);
+    let count = width * height;
+    let (mut color, mut normal) = (vec![[0.0f32; 3]; count], vec![[0.0f32; 3]; count]);
+    let (mut depth, mut energy, mut material) = (vec![0.0; count], vec![0.0; count], vec![0; count]);
+    // The view is read once: it is ten times what the filter takes of it.
+    let all = (&mut color, &mut normal, &mut depth, &mut energy, &mut material, &view.pixels, gathered);
+    all.into_par_iter().with_min_len(width).for_each(|(color, normal, depth, energy, material, pixel, gathered)| {
+        (*color, *energy, *material) = (gathered.color.to_array(), gathered.energy, NOT_GLOSSY);
+        if let Some(p) = pixel {
+            (*normal, *depth) = (p.normal.to_array(), p.depth);
+            *material = if p.alpha.is_some() { p.surface.material } else { NOT_GLOSSY };
+        }
+    });
     let input = FilterInput {
         width,
         height,
-        color: &gathered.par_iter().map(|g| g.color).collect::<Vec<_>>(),
-        normal: &pixels().map(|p| p.map_or(Vec3::ZERO, |p| p.normal)).collect::<Vec<_>>(),
-        depth: &pixels().map(|p| p.map_or(0.0, |p| p.depth)).collect::<Vec<_>>(),
-        material: &pixels().map(material).collect::<Vec<_>>(),
+        color: bytemuck::cast_slice(&color),
+        normal: bytemuck::cast_slice(&normal),
+        depth: &depth,
+        material: &material,
         covariance,
-        energy: &gathered.par_iter().map(|g| g.energy).collect::<Vec<_>>(),
+        energy: &energy,
     };
     filter(&input, params)
 }

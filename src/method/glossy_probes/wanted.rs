@@ -128,8 +128,8 @@ pub fn wanted_texels(
                 // The nearest come first.
                 let probes = &weighted[..weighted.len().min(gather.probes.clamp(1, 8))];
                 for samples in best_samples(fine.position(), &reflected, (tile.as_slice(), view.size()[0]), probes, gather) {
-                    for (w, sample) in probes.iter().zip(samples) {
-                        let Some(sample) = sample else { continue };
+                    for (k, w) in probes.iter().enumerate() {
+                        let Some(sample) = samples.of(k) else { continue };
                         for texel in footprint_texels(w.probe, sample.texel) {
                             wanted[&w.index][texel].store(true, Ordering::Relaxed);
                         }

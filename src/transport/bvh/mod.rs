@@ -7,28 +7,30 @@
 //! below that opacity. Repeating a ray repeats its answer, and the mean over many rays is the opacity. The two faces of a thin
 //! sheet (a blind, a leaf) count once, as in Mitsuba, which steps over the second: see [`SHEET`].
 
+mod beam;
 mod cut;
 mod round;
-mod simd;
 #[cfg(test)]
 mod tests;
 mod traverse;
 mod triangle;
 mod wide;
 
+pub use beam::BEAM;
+
 use super::facet::{Facet, uv_at};
 use crate::base::math::{hash_words, unit};
 use crate::base::ray::{Hit, Ray};
+use crate::base::simd::{Kernel, Lanes, Simd};
 use crate::scene::normals::unit_normal;
 use crate::scene::{Geometry, Round, Scene};
+use beam::Beam;
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use round::RoundTree;
-#[cfg(target_arch = "x86_64")]
-use simd::{Avx2, Avx512, Portable, Simd};
 use std::cell::RefCell;
 use traverse::STACK;
 use wide::Tree;
@@ -52,7 +54,6 @@ pub struct Bvh {
     /// The triangles that it is built over.
     kept: Vec<u32>,
     margin: f32,
-    #[cfg(target_arch = "x86_64")]
     lanes: Lanes,
 }
 
@@ -84,8 +85,7 @@ impl Bvh {
             rounds: RoundTree::build(geometry, keep, round_extent * BOX_MARGIN),
             kept,
             margin,
-            #[cfg(target_arch = "x86_64")]
-            lanes: Lanes::detect(),
+            lanes: Lanes::chosen(),
         }
     }
 
@@ -100,16 +100,21 @@ impl Bvh {
         }
     }
 
-    fn closest_triangle(&self, scene: &Scene, facets: &[Facet], ray: &Ray) -> Option<Hit> {
-        let passes = &mut |hit: &Hit| passes(scene, ray, hit);
-        #[cfg(target_arch = "x86_64")]
-        match self.lanes {
-            // SAFETY: the machine has what the value stands for.
-            Lanes::Avx512(s) => return unsafe { closest_avx512(s, &self.tree, facets, ray, passes) },
-            Lanes::Avx2(s) => return unsafe { closest_avx2(s, &self.tree, facets, ray, passes) },
-            Lanes::Portable => {}
+    /// First hits of rays, which are followed together where they begin at one point and go in much the same direction, [`BEAM`] at the
+    /// most: each one's [`Bvh::closest`].
+    pub fn closest_of(&self, scene: &Scene, facets: &[Facet], rays: &[Ray], hits: &mut [Option<Hit>]) {
+        match Beam::new(rays).filter(|_| self.rounds.is_none() && self.tree.stack <= STACK) {
+            Some(beam) => {
+                let passes = &mut |ray: usize, hit: &Hit| passes(scene, &rays[ray], hit);
+                let found = self.lanes.run(Together(&self.tree, &beam, passes));
+                hits.iter_mut().zip(found).for_each(|(to, hit)| *to = hit);
+            }
+            None => hits.iter_mut().zip(rays).for_each(|(to, ray)| *to = self.closest(scene, facets, ray)),
         }
-        closest_with(Portable, &self.tree, facets, ray, passes)
+    }
+
+    fn closest_triangle(&self, scene: &Scene, facets: &[Facet], ray: &Ray) -> Option<Hit> {
+        self.lanes.run(Closest(&self.tree, facets, ray, &mut |hit: &Hit| passes(scene, ray, hit)))
     }
 
     /// Whether anything lies in [t_min, t_max].
@@ -120,15 +125,7 @@ impl Bvh {
     }
 
     fn triangle_occludes(&self, scene: &Scene, ray: &Ray) -> bool {
-        let passes = &mut |hit: &Hit| passes(scene, ray, hit);
-        #[cfg(target_arch = "x86_64")]
-        match self.lanes {
-            // SAFETY: the machine has what the value stands for.
-            Lanes::Avx512(s) => return unsafe { any_avx512(s, &self.tree, ray, passes) },
-            Lanes::Avx2(s) => return unsafe { any_avx2(s, &self.tree, ray, passes) },
-            Lanes::Portable => {}
-        }
-        any_with(Portable, &self.tree, ray, passes)
+        self.lanes.run(Any(&self.tree, ray, &mut |hit: &Hit| passes(scene, ray, hit)))
     }
 
     /// The same triangles in the compressed tree that GPUs read, and their indices in the order of its leaves. `geometry` is what
@@ -137,23 +134,6 @@ impl Bvh {
         let tree = bvh2_to_cwbvh(&triangle_tree(geometry, &self.kept, self.margin), MAX_COMPRESSED_LEAF, true, false);
         let triangles = tree.primitive_indices.iter().map(|&i| self.kept[i as usize]).collect();
         (tree, triangles)
-    }
-}
-
-/// Forms of the traversal that the machine may have.
-#[cfg(target_arch = "x86_64")]
-#[derive(Clone, Copy)]
-enum Lanes {
-    Avx512(Avx512),
-    Avx2(Avx2),
-    Portable,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Lanes {
-    fn detect() -> Self {
-        let avx2 = || Avx2::detect().map_or(Self::Portable, Self::Avx2);
-        Avx512::detect().map_or_else(avx2, Self::Avx512)
     }
 }
 
@@ -184,46 +164,54 @@ thread_local! {
     static STACKS: RefCell<([f32; STACK], [u32; STACK])> = const { RefCell::new(([0.0; STACK], [0; STACK])) };
 }
 
-#[inline(always)]
-fn closest_with<S: Simd>(s: S, tree: &Tree, facets: &[Facet], ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    if tree.stack <= STACK {
-        STACKS.with_borrow_mut(|(entries, ids)| traverse::closest(s, tree, facets, ray, (entries, ids), passes))
-    } else {
-        traverse::closest(s, tree, facets, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
+/// What may wave a hit through.
+type Passes<'a> = &'a mut dyn FnMut(&Hit) -> bool;
+
+/// The first hit.
+struct Closest<'a>(&'a Tree, &'a [Facet], &'a Ray, Passes<'a>);
+
+impl Kernel for Closest<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Option<Hit> {
+        let Self(tree, facets, ray, passes) = self;
+        if tree.stack <= STACK {
+            STACKS.with_borrow_mut(|(entries, ids)| traverse::closest(s, tree, facets, ray, (entries, ids), passes))
+        } else {
+            traverse::closest(s, tree, facets, ray, (&mut vec![0.0; tree.stack], &mut vec![0; tree.stack]), passes)
+        }
     }
 }
 
-#[inline(always)]
-fn any_with<S: Simd>(s: S, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
-    if tree.stack <= STACK {
-        STACKS.with_borrow_mut(|(_, ids)| traverse::any(s, tree, ray, ids, passes))
-    } else {
-        traverse::any(s, tree, ray, &mut vec![0; tree.stack], passes)
+/// The first hits of a beam, in a tree for which the thread's stack is deep enough.
+struct Together<'a>(&'a Tree, &'a Beam<'a>, &'a mut dyn FnMut(usize, &Hit) -> bool);
+
+impl Kernel for Together<'_> {
+    type Output = [Option<Hit>; BEAM];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> [Option<Hit>; BEAM] {
+        let Self(tree, beam, passes) = self;
+        STACKS.with_borrow_mut(|(entries, ids)| beam::closest(s, tree, beam, (entries, ids), passes))
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn closest_avx2(s: Avx2, tree: &Tree, facets: &[Facet], ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    closest_with(s, tree, facets, ray, passes)
-}
+/// Whether there is any.
+struct Any<'a>(&'a Tree, &'a Ray, Passes<'a>);
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn any_avx2(s: Avx2, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
-    any_with(s, tree, ray, passes)
-}
+impl Kernel for Any<'_> {
+    type Output = bool;
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn closest_avx512(s: Avx512, tree: &Tree, facets: &[Facet], ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> Option<Hit> {
-    closest_with(s, tree, facets, ray, passes)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn any_avx512(s: Avx512, tree: &Tree, ray: &Ray, passes: &mut dyn FnMut(&Hit) -> bool) -> bool {
-    any_with(s, tree, ray, passes)
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> bool {
+        let Self(tree, ray, passes) = self;
+        if tree.stack <= STACK {
+            STACKS.with_borrow_mut(|(_, ids)| traverse::any(s, tree, ray, ids, passes))
+        } else {
+            traverse::any(s, tree, ray, &mut vec![0; tree.stack], passes)
+        }
+    }
 }
 
 /// Whether `ray` goes through a triangle of partly opaque material.

@@ -231,12 +231,11 @@ fn a_thin_sheet_counts_once_and_two_sheets_twice() {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
 #[test]
 fn all_forms_answer_bit_for_bit() {
-    let (avx2, avx512) = (Avx2::detect(), Avx512::detect());
-    if avx512.is_none() {
-        println!("skipped: no AVX-512 here");
+    let forms = Lanes::all();
+    if forms.len() < 3 {
+        println!("skipped: forms that this machine lacks");
     }
     let mut random = Random(5);
     let mut scene = scene_of(soup(1200, &mut random), Mat4::IDENTITY);
@@ -245,28 +244,48 @@ fn all_forms_answer_bit_for_bit() {
     let mut hits = 0;
     for i in 0..6000 {
         let ray = ray_of(i, &scene.geometry, 1.0, &mut random);
-        // A mask that waves through every third triangle, to see that both are asked about the same ones.
-        let pass = |hit: &Hit| hit.triangle.is_multiple_of(3);
+        // A mask that waves through every third triangle, to see that all are asked about the same ones.
+        let mut pass = |hit: &Hit| hit.triangle.is_multiple_of(3);
         let bits = |h: Option<Hit>| h.map(|h| (h.t.to_bits(), h.triangle, h.u.to_bits(), h.v.to_bits()));
-        let a = closest_with(Portable, &bvh.tree, &[], &ray, &mut |h| pass(h));
-        let any = any_with(Portable, &bvh.tree, &ray, &mut |h| pass(h));
-        if let Some(s) = avx2 {
-            // SAFETY: it was detected.
-            let (b, any_b) = unsafe {
-                (closest_avx2(s, &bvh.tree, &[], &ray, &mut |h| pass(h)), any_avx2(s, &bvh.tree, &ray, &mut |h| pass(h)))
-            };
-            assert_eq!((bits(a), any), (bits(b), any_b), "AVX2, ray {i}");
+        let mut answers = |lanes: &Lanes| {
+            let closest = lanes.run(Closest(&bvh.tree, &[], &ray, &mut pass));
+            (bits(closest), lanes.run(Any(&bvh.tree, &ray, &mut pass)))
+        };
+        let [first, others @ ..] = forms.as_slice() else { panic!("no form") };
+        let expected = answers(first);
+        for lanes in others {
+            assert_eq!(answers(lanes), expected, "{} and {}, ray {i}", lanes.name(), first.name());
         }
-        if let Some(s) = avx512 {
-            // SAFETY: it was detected.
-            let (b, any_b) = unsafe {
-                (closest_avx512(s, &bvh.tree, &[], &ray, &mut |h| pass(h)), any_avx512(s, &bvh.tree, &ray, &mut |h| pass(h)))
-            };
-            assert_eq!((bits(a), any), (bits(b), any_b), "AVX-512, ray {i}");
-        }
-        hits += u32::from(a.is_some());
+        hits += u32::from(expected.0.is_some());
     }
     assert!((2000..6000).contains(&hits), "{hits}");
+}
+
+#[test]
+fn rays_together_meet_what_they_meet_alone() {
+    let mut random = Random(8);
+    let scene = scene_of(soup(1200, &mut random), Mat4::IDENTITY);
+    let bvh = Bvh::build(&scene, &|_| true);
+    let (mut together, mut hits) = (0, 0);
+    for i in 0..1500 {
+        let (o, d) = (random.point() * 1.5, random.direction());
+        let spread = [0.0, 1e-4, 0.02, 0.3][i % 4];
+        let count = 1 + i % BEAM;
+        let mut ray = || {
+            let mut ray = Ray::new(o, (d + random.direction() * spread).normalize());
+            (ray.t_min, ray.t_max) = if i % 3 == 0 { (random.next() * 0.2, random.next() * 2.0) } else { (0.0, f32::INFINITY) };
+            ray
+        };
+        let rays: Vec<Ray> = (0..count).map(|_| ray()).collect();
+        together += usize::from(Beam::new(&rays).is_some());
+        let mut found = [None; BEAM];
+        bvh.closest_of(&scene, &[], &rays, &mut found);
+        for (k, ray) in rays.iter().enumerate() {
+            assert_eq!(found[k], bvh.closest(&scene, &[], ray), "ray {k} of {i}");
+        }
+        hits += found.iter().flatten().count();
+    }
+    assert!((700..1500).contains(&together) && hits > 3000, "{together} beams, {hits} hits");
 }
 
 #[test]

@@ -1,16 +1,16 @@
 //! Walks through the eight-wide tree: nearest octant first for the closest hit, farthest first for any hit.
 
-use super::simd::Simd;
 use super::triangle::Shear;
 use super::wide::{Block, MARK, Node, Tree};
 use super::{Facet, Hit, Ray};
 use crate::base::prefetch::{prefetch, prefetch_at};
+use crate::base::simd::Simd;
 
 /// Distances to the far sides of boxes grow by this much against rounding: 4 ulp, where the slab test can lose 3 (compare Ize 2013).
-const FAR_SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
+pub(super) const FAR_SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
 
 /// Directions closer to zero than this count as this, so that no slab is 0 times infinity.
-const LEAST_DIRECTION: f32 = 1e-24;
+pub(super) const LEAST_DIRECTION: f32 = 1e-24;
 
 /// Entries of the stack that lives on the machine's: enough for nodes 17 deep, and the real scenes have 14.
 pub const STACK: usize = 128;
@@ -26,8 +26,13 @@ struct Prepared<S: Simd> {
     /// Which of `Node::bounds` a ray enters through, for each axis; it leaves through the others.
     near: [usize; 3],
     order: S::I,
+    triangles: Sheared<S>,
+}
+
+/// A ray made ready for triangles.
+pub(super) struct Sheared<S: Simd> {
     t_min: S::F,
-    shear_origin: [S::F; 3],
+    origin: [S::F; 3],
     shear: [S::F; 3],
     axes: [usize; 3],
 }
@@ -39,16 +44,12 @@ impl<S: Simd> Prepared<S> {
         let d = [ray.d.x, ray.d.y, ray.d.z];
         let negative = d.map(|x| x.is_sign_negative());
         let inverse = d.map(|x| 1.0 / if x.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(x) } else { x });
-        let shear = Shear::new(ray);
         Self {
             inverse: splat3(s, inverse),
             start: splat3(s, [ray.o.x * inverse[0], ray.o.y * inverse[1], ray.o.z * inverse[2]]),
             near: [0, 1, 2].map(|k| if negative[k] { k + 3 } else { k }),
             order: s.octant_order(first),
-            t_min: s.splat(ray.t_min),
-            shear_origin: splat3(s, shear.origin),
-            shear: splat3(s, shear.shear),
-            axes: shear.axes,
+            triangles: Sheared::new(s, &Shear::new(ray), ray.t_min),
         }
     }
 
@@ -67,22 +68,29 @@ impl<S: Simd> Prepared<S> {
         let (nx, ny, nz) = (self.side(s, node, x, 0), self.side(s, node, y, 1), self.side(s, node, z, 2));
         let (fx, fy, fz) = (self.side(s, node, 3 - x, 0), self.side(s, node, 5 - y, 1), self.side(s, node, 7 - z, 2));
         let leave = s.mul(s.min(s.min(fx, fy), fz), s.splat(FAR_SLACK));
-        (s.max(s.max(nx, ny), s.max(nz, self.t_min)), s.min(leave, t_max))
+        (s.max(s.max(nx, ny), s.max(nz, self.triangles.t_min)), s.min(leave, t_max))
+    }
+}
+
+impl<S: Simd> Sheared<S> {
+    #[inline(always)]
+    pub(super) fn new(s: S, ray: &Shear, t_min: f32) -> Self {
+        Self { t_min: s.splat(t_min), origin: splat3(s, ray.origin), shear: splat3(s, ray.shear), axes: ray.axes }
     }
 
     /// The corners `k` of eight triangles, sheared.
     #[inline(always)]
     fn corner(&self, s: S, block: &Block, k: usize) -> [S::F; 3] {
         let [kx, ky, kz] = self.axes;
-        let z = s.sub(s.load(&block.corners[k][kz]), self.shear_origin[2]);
-        let x = s.sub(s.load(&block.corners[k][kx]), self.shear_origin[0]);
-        let y = s.sub(s.load(&block.corners[k][ky]), self.shear_origin[1]);
+        let z = s.sub(s.load(&block.corners[k][kz]), self.origin[2]);
+        let x = s.sub(s.load(&block.corners[k][kx]), self.origin[0]);
+        let y = s.sub(s.load(&block.corners[k][ky]), self.origin[1]);
         [s.sub(x, s.mul(self.shear[0], z)), s.sub(y, s.mul(self.shear[1], z)), z]
     }
 
     /// [`Shear::intersect`] of eight triangles: a bit for each that is hit within [t_min, t_max]; t, u and v.
     #[inline(always)]
-    fn block(&self, s: S, block: &Block, t_max: S::F) -> (u32, S::F, S::F, S::F) {
+    pub(super) fn block(&self, s: S, block: &Block, t_max: S::F) -> (u32, S::F, S::F, S::F) {
         let a = self.corner(s, block, 0);
         let b = self.corner(s, block, 1);
         let c = self.corner(s, block, 2);
@@ -140,7 +148,7 @@ pub fn closest<S: Simd>(
             top = end;
         } else {
             let block = &tree.blocks[(id & !MARK) as usize];
-            let (mut mask, t, u, v) = r.block(s, block, s.splat(nearest));
+            let (mut mask, t, u, v) = r.triangles.block(s, block, s.splat(nearest));
             if mask == 0 {
                 continue;
             }
@@ -184,7 +192,7 @@ pub fn any<S: Simd>(s: S, tree: &Tree, ray: &Ray, ids: &mut [u32], passes: &mut 
             top = end;
         } else {
             let block = &tree.blocks[(id & !MARK) as usize];
-            let (mut mask, t, u, v) = r.block(s, block, t_max);
+            let (mut mask, t, u, v) = r.triangles.block(s, block, t_max);
             if mask == 0 {
                 continue;
             }
@@ -217,7 +225,7 @@ fn prefetch_all(tree: &Tree, ids: &[u32]) {
 
 /// A bit for each axis along which the ray goes down.
 #[inline(always)]
-fn octant(ray: &Ray) -> u32 {
+pub(super) fn octant(ray: &Ray) -> u32 {
     let [x, y, z] = [ray.d.x, ray.d.y, ray.d.z].map(|x| u32::from(x.is_sign_negative()));
     x | y << 1 | z << 2
 }
@@ -228,7 +236,7 @@ fn splat3<S: Simd>(s: S, x: [f32; 3]) -> [S::F; 3] {
 }
 
 #[inline(always)]
-fn lanes<S: Simd>(s: S, x: S::F) -> [f32; 8] {
+pub(super) fn lanes<S: Simd>(s: S, x: S::F) -> [f32; 8] {
     let mut out = [0.0; 8];
     s.store(x, &mut out);
     out

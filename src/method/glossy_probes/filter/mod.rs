@@ -15,7 +15,7 @@
 pub(crate) mod four_pass;
 
 use crate::Result;
-use crate::base::math::Rgb;
+use crate::base::math::{Rgb, major_axis};
 use crate::base::named::within;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -167,10 +167,9 @@ fn in_range(input: &FilterInput, i: usize, j: usize, params: &FilterParams) -> b
 /// Principal axes of a covariance: unit direction of the larger variance, and both variances.
 fn principal([xx, xy, yy]: [f32; 3]) -> (Vec2, f32, f32) {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-    let radius = half.hypot(xy);
-    let angle = if radius > 0.0 { 0.5 * xy.atan2(half) } else { 0.0 };
+    let radius = (half * half + xy * xy).sqrt();
     let valid = |v: f32| if v.is_finite() { v.max(0.0) } else { 0.0 };
-    (Vec2::new(angle.cos(), angle.sin()), valid(mean + radius), valid(mean - radius))
+    (major_axis(half, xy, radius), valid(mean + radius), valid(mean - radius))
 }
 
 /// Eq. 4, pixel by pixel.

@@ -145,14 +145,12 @@ impl Footprint {
 
     /// Standard deviation of the footprint of a plane seen along its normal, at focal length 1.
     pub fn sigma(&self, alpha: f32, d_c: f32, d_r: f32) -> f32 {
-        let place = |t: f32| {
-            let f = t.clamp(0.0, 1.0) * (BINS - 1) as f32;
-            let i = (f as usize).min(BINS - 2);
-            (i, f - i as f32)
-        };
-        let distance = |d: f32| place(((d.max(DISTANCES[0]) - DISTANCES[0]) / (DISTANCES[1] - DISTANCES[0])).min(1.0).cbrt());
+        self.sigma_at(alpha, [d_c, d_r].map(distance_place))
+    }
+
+    /// The same, of distances whose places in the table are known.
+    fn sigma_at(&self, alpha: f32, [(c, fc), (r, fr)]: [(usize, f32); 2]) -> f32 {
         let (a, fa) = place((alpha.max(0.0) / MAX_ALPHA).sqrt());
-        let ((c, fc), (r, fr)) = (distance(d_c), distance(d_r));
         let line = |a: usize, c: usize| {
             let row = &self.table[(a * BINS + c) * BINS + r..];
             row[0] + (row[1] - row[0]) * fr
@@ -164,9 +162,13 @@ impl Footprint {
     /// Covariance `[xx, xy, yy]` of the image filter at a pixel of `camera`, pixels² (Eq. 3). Zero for mirrors.
     pub fn covariance(&self, camera: &Camera, point: &GlossyPoint) -> [f32; 3] {
         let p = &self.params;
+        if point.alpha <= 0.0 {
+            return [0.0; 3];
+        }
         let d_c = camera.position().distance(point.x);
-        let full = self.sigma(point.alpha, d_c, point.reflected_distance);
-        let baked = self.sigma(point.alpha * p.roughness_scale, d_c, point.reflected_distance);
+        let places = [d_c, point.reflected_distance].map(distance_place);
+        let full = self.sigma_at(point.alpha, places);
+        let baked = self.sigma_at(point.alpha * p.roughness_scale, places);
         let mut variance = full * full - baked * baked;
         if p.small_d_r > 0.0 {
             variance *= (point.reflected_distance / p.small_d_r).min(1.0);
@@ -222,6 +224,18 @@ impl Footprint {
         let step = g.inverse() * (2.0 * e.z);
         [step.x_axis, step.y_axis].map(|u| pixels(frame.to_world(u.extend(0.0))))
     }
+}
+
+/// Cell of the table along an axis, and place in it, for `t` in [0, 1].
+fn place(t: f32) -> (usize, f32) {
+    let f = t.clamp(0.0, 1.0) * (BINS - 1) as f32;
+    let i = (f as usize).min(BINS - 2);
+    (i, f - i as f32)
+}
+
+/// The same of a distance, m.
+fn distance_place(d: f32) -> (usize, f32) {
+    place(((d.max(DISTANCES[0]) - DISTANCES[0]) / (DISTANCES[1] - DISTANCES[0])).min(1.0).cbrt())
 }
 
 /// GGX lobe (Walter et al. 2007, without Fresnel) of a plane with normal z, D G / (4 cos cos); directions are unit.
