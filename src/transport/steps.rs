@@ -15,6 +15,10 @@ pub struct Steps {
 /// environment's rows drive one another out of the cache.
 const PER_PART: usize = 32;
 
+/// Sums in a line of the cache, and lines that are fetched at the most.
+const PER_LINE: usize = 16;
+const MOST_LINES: usize = 4;
+
 impl Steps {
     /// The distribution in proportion to `values` (not negative, at least one), and their sum. Even where that is zero.
     pub fn new(values: impl IntoIterator<Item = f64>) -> (Self, f64) {
@@ -53,7 +57,10 @@ impl Steps {
     /// Tells the caches what [`Steps::pick`] will read.
     pub fn prefetch(&self, u: f32) {
         let [first, last] = self.bounds(u);
-        prefetch_at(&self.sums, first);
+        // Where outcomes are unlikely, many share a part.
+        for step in (first..=last).step_by(PER_LINE).take(MOST_LINES) {
+            prefetch_at(&self.sums, step);
+        }
         prefetch_at(&self.sums, last);
     }
 

@@ -155,9 +155,10 @@ fn efficiency<const N: usize>(pixels: &[Pixel<N>], weights: &[[Rgb; N]], count: 
 /// The full image's sample.
 pub(super) fn full(walk: &mut Walk, ray: &Ray, [weight]: &[Rgb; 1], sampler: &mut Sampler) -> ([Rgb; 1], f32) {
     let world = walk.world;
+    let numbers = walk.emitter_numbers(sampler);
     let Some(surface) = world.seen(ray) else { return ([world.backdrop(ray.d)], RAY_COST) };
     let start = Start { weight: *weight, eta: 1.0, depth: 0 };
-    let scattered = walk.scattered(&surface, -ray.d, Query::default(), start, sampler);
+    let scattered = walk.scattered(numbers, &surface, -ray.d, Query::default(), start, sampler);
     let emitted = world.lights.emitted(&world.scene, &surface, -ray.d);
     ([emitted + scattered.light], RAY_COST + scattered.cost)
 }
@@ -165,16 +166,18 @@ pub(super) fn full(walk: &mut Walk, ray: &Ray, [weight]: &[Rgb; 1], sampler: &mu
 /// The layers' sample: emission, diffuse, glossy. The two halves of the first vertex have paths of their own.
 pub(super) fn layers(walk: &mut Walk, ray: &Ray, weights: &[Rgb; 3], sampler: &mut Sampler) -> ([Rgb; 3], f32) {
     let world = walk.world;
+    let mut branches = [0, 1].map(|k| sampler.branch(k));
+    let numbers = branches.each_mut().map(|branch| walk.emitter_numbers(branch));
     let Some(surface) = world.seen(ray) else { return ([world.backdrop(ray.d), Rgb::ZERO, Rgb::ZERO], RAY_COST) };
     let present = world.scene.materials[surface.material as usize].bsdf.lobes();
     let mut layers = [world.lights.emitted(&world.scene, &surface, -ray.d), Rgb::ZERO, Rgb::ZERO];
     let mut cost = RAY_COST;
-    for (k, lobes) in [(1, Lobes::DIFFUSE), (2, Lobes::NON_DIFFUSE)] {
+    for (k, lobes) in [Lobes::DIFFUSE, Lobes::NON_DIFFUSE].into_iter().enumerate() {
         if present.intersects(lobes) {
             let query = Query { lobes, ..Query::default() };
-            let start = Start { weight: weights[k], eta: 1.0, depth: 0 };
-            let scattered = walk.scattered(&surface, -ray.d, query, start, &mut sampler.branch(k as u32 - 1));
-            layers[k] = scattered.light;
+            let start = Start { weight: weights[k + 1], eta: 1.0, depth: 0 };
+            let scattered = walk.scattered(numbers[k], &surface, -ray.d, query, start, &mut branches[k]);
+            layers[k + 1] = scattered.light;
             cost += scattered.cost;
         }
     }

@@ -84,14 +84,17 @@ struct Reached<'a> {
 }
 
 impl Walk<'_> {
-    /// One estimate of the radiance that `s` scatters to `wo` by the lobes of `query`.
-    pub fn scattered(&mut self, s: &Surface, wo: Vec3, query: Query, start: Start, sampler: &mut Sampler) -> Estimate {
-        let numbers = sampler.next_4d();
-        self.scattered_with(numbers, s, wo, query, start, sampler)
+    /// The numbers by which a vertex will choose an emitter; best drawn before the ray to it is cast, so that tables are fetched while it is
+    /// under way.
+    #[inline]
+    pub fn emitter_numbers(&self, sampler: &mut Sampler) -> [f32; 4] {
+        let numbers @ [x, y, choice, _] = sampler.next_4d();
+        self.world.lights.prefetch(choice, Vec2::new(x, y));
+        numbers
     }
 
-    /// [`Walk::scattered`] whose numbers for the emitter have been drawn.
-    fn scattered_with(
+    /// One estimate of the radiance that `s` scatters to `wo` by the lobes of `query`; `numbers` are [`Walk::emitter_numbers`].
+    pub fn scattered(
         &mut self,
         mut numbers: [f32; 4],
         s: &Surface,
@@ -100,6 +103,8 @@ impl Walk<'_> {
         start: Start,
         sampler: &mut Sampler,
     ) -> Estimate {
+        self.world.lights.prefetch_radiance(numbers[2], Vec2::new(numbers[0], numbers[1]));
+        self.world.prefetch(s);
         let vertex = Vertex { world: self.world, surface: s, measure: Measure::Scattering { wi: s.frame.to_local(wo), query } };
         let lobes = self.world.scene.materials[s.material as usize].bsdf.lobes();
         let direction = lobes.intersects(Lobes::NON_DIFFUSE).then_some(wo);
@@ -175,16 +180,12 @@ impl Walk<'_> {
     /// Radiance along a ray: emission, weighted against the emitter sampling at its origin, and what is scattered there.
     fn incident(&mut self, ray: &Ray, from: &Receiver, (pdf, delta): (f32, bool), at: Start, sampler: &mut Sampler) -> Estimate {
         let world = self.world;
-        // Drawn before the ray is cast, so that tables can be fetched while it is under way.
-        let numbers = sampler.next_4d();
-        world.lights.prefetch(numbers[2], Vec2::new(numbers[0], numbers[1]));
+        let numbers = self.emitter_numbers(sampler);
         let Some(s) = world.intersect(ray) else {
             let light = world.lights.environment(ray.d);
             let other = if delta || light == Rgb::ZERO { 0.0 } else { world.lights.pdf_environment(ray.d) };
             return Estimate { light: light * power_heuristic(pdf, other), cost: 0.0 };
         };
-        world.lights.prefetch_radiance(numbers[2], Vec2::new(numbers[0], numbers[1]));
-        world.prefetch(&s);
         let wo = -ray.d;
         let mut sum = Estimate::default();
         if s.emitter.is_some() {
@@ -193,7 +194,7 @@ impl Walk<'_> {
             sum.light = light * power_heuristic(pdf, other);
         }
         if at.depth < self.params.max_depth {
-            sum.add(self.scattered_with(numbers, &s, wo, Query::default(), at, sampler), Rgb::ONE);
+            sum.add(self.scattered(numbers, &s, wo, Query::default(), at, sampler), Rgb::ONE);
         }
         sum
     }
