@@ -362,3 +362,21 @@ fn a_turned_sky_lights_from_where_it_is_seen() {
         assert!((found - Rgb::splat(expected)).abs().max_element() < 0.02, "side {side}: {found}");
     }
 }
+
+#[test]
+fn paths_by_efficiency_end_where_roulette_never_would() {
+    // A box whose walls all glow and reflect .9, from within: ten times what they emit, whichever way one looks.
+    let mut room = Room::default();
+    let walls = room.inward_box(Vec3::splat(-1.0), Vec3::splat(1.0), diffuse(0.9));
+    room.emit(walls, Rgb::ONE);
+    let world = room.world();
+    let camera = Camera::look_at(Vec3::ZERO, Vec3::new(0.3, 0.2, 1.0), Vec3::Y, 1.2, [12, 8]);
+    let endless = PathParams { max_depth: u32::MAX, rr_depth: u32::MAX };
+    let params = PathTraceParams { spp: 32, path: endless, efficiency: true, ..PathTraceParams::default() };
+    let render =
+        |seed| path_trace_full(&world, &camera, &params, seed, 0, &Silent).iter().map(|c| f64::from(c.x)).sum::<f64>() / 96.0;
+    let means: Vec<f64> = (0..12).map(render).collect();
+    let mean = means.iter().sum::<f64>() / 12.0;
+    let sigma = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (12.0 * 11.0)).sqrt();
+    assert!(sigma < 0.1 && (mean - 10.0).abs() < 4.0 * sigma + 1e-3, "{mean} ± {sigma} where walls give 10");
+}

@@ -13,7 +13,8 @@ use glam::{Vec2, Vec3};
 /// Fewest and most estimates of a kind at a vertex, on average. Where a cell is wrong about a place, the least keeps the variance bounded.
 const ESTIMATES: [f32; 2] = [0.05, 4.0];
 
-/// Vertices after which paths thin out, whatever they bring: trees must end.
+/// Vertices after which paths thin out, whatever they bring and whatever the scene says of roulette: a vertex is a call within that of the
+/// one before, and the stack has an end.
 const DEEP: u32 = 64;
 
 /// What continuations of a path's vertices go by.
@@ -162,8 +163,9 @@ impl Walk<'_> {
         let mut weight = at.start.weight * sample.weight * share;
         let (eta, depth) = (at.start.eta * sample.eta, at.start.depth + 1);
         let mut survival = 1.0;
-        if self.plan.is_none() && depth >= self.params.rr_depth {
-            survival = (weight.max_element() * eta * eta * ROULETTE_MERCY).min(ROULETTE_CAP);
+        if self.plan.is_none() && depth >= self.params.rr_depth.min(DEEP) {
+            let most = if depth > DEEP { 0.5 } else { ROULETTE_CAP };
+            survival = (weight.max_element() * eta * eta * ROULETTE_MERCY).min(most);
             if live >= survival {
                 return Estimate { light: Rgb::ZERO, cost: DRAW_COST };
             }
