@@ -1,4 +1,4 @@
-// Twin of src/method/path_trace/mod.rs: image.
+// Twin of src/method/path_trace/mod.rs: means.
 // Adds a quantity's samples to the sums of a run of pixels, and clears them.
 
 struct Params {

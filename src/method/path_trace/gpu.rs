@@ -55,7 +55,7 @@ pub(crate) const CAMERA_HITS: KernelSpec = KernelSpec {
 /// The sums over a pixel's samples.
 pub(crate) const ADD_SAMPLES: KernelSpec = KernelSpec {
     file: "path_trace/add_samples.wgsl",
-    twin: "src/method/path_trace/mod.rs: image",
+    twin: "src/method/path_trace/mod.rs: means",
     workgroup: [64, 1],
     scene: false,
     bindings: &[("params", Access::Uniform), ("values", Access::ReadWrite), ("frame", Access::ReadWrite)],
