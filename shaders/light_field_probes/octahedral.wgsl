@@ -1,4 +1,4 @@
-// The octahedral map of directions. Twin: src/probe/octahedral.rs.
+// The octahedral map of directions. Twin: src/base/octahedral.rs.
 
 // #include "shared/math.wgsl"
 

@@ -4,6 +4,7 @@ pub mod clock;
 pub mod error;
 pub mod math;
 pub mod named;
+pub mod octahedral;
 pub mod prefetch;
 pub mod progress;
 pub mod ray;

@@ -5,9 +5,9 @@ use super::probes::cube::{Mirror, diffuse, direction, reflections};
 use super::probes::volume::volume;
 use super::probes::{Around, Probe};
 use crate::base::math::{Basis, Rgb};
+use crate::base::octahedral::middle;
 use crate::io::Provenance;
 use crate::method::light_field_probes::probe::Light;
-use crate::probe::octahedral::middle;
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 

@@ -12,7 +12,6 @@ pub mod neighbors;
 pub mod nonuniform;
 #[cfg(test)]
 mod nonuniform_tests;
-pub mod octahedral;
 pub mod parameter_map;
 pub mod placement;
 pub mod places;

@@ -2,11 +2,11 @@
 
 use super::{Around, Probe};
 use crate::base::math::Rgb;
+use crate::base::octahedral::{middle, solid_angle};
 use crate::base::ray::Ray;
 use crate::lightmap::LightMap;
 use crate::method::light_field_probes::probe::Light;
 use crate::probe::file::Probe as Glossy;
-use crate::probe::octahedral::{middle, solid_angle};
 use crate::transport::World;
 use glam::Vec3;
 use rayon::prelude::*;

@@ -5,9 +5,9 @@ pub mod look;
 pub mod volume;
 
 use crate::base::math::Rgb;
+use crate::base::octahedral::{middle, solid_angle, taps};
 use crate::method::light_field_probes::probe::Light;
 use crate::method::radiance_probes::harmonics::Harmonics;
-use crate::probe::octahedral::{middle, solid_angle, taps};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
 

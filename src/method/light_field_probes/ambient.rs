@@ -3,7 +3,7 @@
 use super::octree::{NO_PROBE, Octree, WIDTH};
 use super::probe::{Ambient, Surfels};
 use crate::base::math::Rgb;
-use crate::probe::octahedral::{middle, solid_angle, taps};
+use crate::base::octahedral::{middle, solid_angle, taps};
 use crate::probe::placement::ProbeWeight;
 use crate::probe::places::Places;
 use glam::{Vec2, Vec3};

@@ -7,7 +7,7 @@
 
 use super::probe::Surfels;
 use super::pyramid::Pyramid;
-use crate::probe::octahedral::within_octant;
+use crate::base::octahedral::within_octant;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;

@@ -7,7 +7,7 @@
 //! no other one of the four sees.
 
 use super::probe::Surfels;
-use crate::probe::octahedral::encode;
+use crate::base::octahedral::encode;
 use crate::probe::places::Places;
 use crate::{Error, Result};
 use glam::{UVec3, Vec3};
@@ -255,7 +255,7 @@ fn sees(probe: &Candidate, p: Vec3) -> bool {
 mod tests {
     use super::*;
     use crate::base::math::{hash_words, unit};
-    use crate::probe::octahedral::{middle, pack};
+    use crate::base::octahedral::{middle, pack};
 
     /// Two probes in rooms of their own beside each other, and what each sees.
     fn two_rooms(n: usize) -> Vec<(Vec3, Surfels)> {

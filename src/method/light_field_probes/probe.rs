@@ -1,7 +1,7 @@
 //! What a light field probe stores of each direction: how far the surface is, how it lies, and the light that comes from there.
 
 use crate::base::math::Rgb;
-use crate::probe::octahedral::{decode, middle, taps, unpack};
+use crate::base::octahedral::{decode, middle, taps, unpack};
 use glam::{Vec2, Vec3};
 use half::f16;
 
@@ -35,7 +35,7 @@ pub struct Surfels {
     pub size: usize,
     /// Distance to the first surface, metres; infinite where there is none.
     pub distance: Vec<f32>,
-    /// Unit geometric normal on the probe's side, [packed](crate::probe::octahedral::pack).
+    /// Unit geometric normal on the probe's side, [packed](crate::base::octahedral::pack).
     pub normal: Vec<u32>,
 }
 

@@ -8,8 +8,8 @@ use super::march::Map;
 use super::octree::Octree;
 use super::probe::{Ambient, LEAST_LIGHT, Light, Surfels};
 use crate::base::math::Rgb;
+use crate::base::octahedral::pack;
 use crate::io::{ExrImage, Provenance, json};
-use crate::probe::octahedral::pack;
 use crate::probe::places::Places;
 use crate::probe::set::{ProbeSet, read_member};
 use crate::probe::store::read_set_of;
@@ -147,7 +147,7 @@ impl Seen {
     pub fn to_image(&self, provenance: &Provenance) -> ExrImage {
         let n = self.surfels.size;
         let mut image = ExrImage::new(n, n).with_f32("distance", self.surfels.distance.clone());
-        let normals: Vec<Vec3> = self.surfels.normal.iter().map(|&bits| crate::probe::octahedral::unpack(bits)).collect();
+        let normals: Vec<Vec3> = self.surfels.normal.iter().map(|&bits| crate::base::octahedral::unpack(bits)).collect();
         for (name, vectors) in [("normal", &normals), ("facing", &self.facing)] {
             for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
                 image = image.with_f16(&format!("{name}.{axis}"), vectors.iter().map(|v| v[k]));

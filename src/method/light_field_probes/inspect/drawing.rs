@@ -1,12 +1,12 @@
 //! The picture of a ray's way: in the scene from above and from the side, and on the maps of the probes that were asked.
 
 use super::way::Way;
+use crate::base::octahedral::encode;
 use crate::io::canvas::{BACKGROUND, Canvas, Colour, INK, LINE};
 use crate::io::picture::scalar;
 use crate::method::light_field_probes::field::LightField;
 use crate::method::light_field_probes::march::LocalRay;
 use crate::method::light_field_probes::trace::{Found, Step};
-use crate::probe::octahedral::encode;
 use crate::probe::plan_picture::Plan;
 use crate::probe::skeleton::space::Space;
 use crate::transport::World;
