@@ -4,7 +4,7 @@
 // #include "shared/view.wgsl"
 
 // The shading normal of a surface, turned to the side of the viewer at direction `wo`; the geometric one where that turns away from the
-// viewer all the same. Twin: view::mirror::facing_normal.
+// viewer all the same. Twin: material::Surface::facing_normal.
 fn facing_normal(s: Surface, wo: vec3<f32>) -> vec3<f32> {
     let ng = select(s.ng, -s.ng, dot(s.ng, wo) < 0.0);
     let n = select(s.frame.n, -s.frame.n, dot(s.frame.n, ng) < 0.0);

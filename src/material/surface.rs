@@ -52,6 +52,36 @@ pub(crate) fn ray_offset(p: Vec3, extent: f32) -> f32 {
 }
 
 impl Surface {
+    /// A point with unit normal `n` of something flat that belongs to no scene: what a model can be asked about by itself.
+    pub fn flat(p: Vec3, n: Vec3) -> Self {
+        let frame = Basis::from_normal(n);
+        Self {
+            p,
+            ng: n,
+            frame,
+            uv: Vec2::ZERO,
+            dp_du: frame.s,
+            dp_dv: frame.t,
+            t: 1.0,
+            triangle: 0,
+            barycentric: Vec2::ZERO,
+            object: 0,
+            material: 0,
+            emitter: None,
+            offset: 0.0,
+        }
+    }
+
+    /// The shading normal, turned to the side of the viewer at direction `wo` (unit, away from the surface).
+    ///
+    /// Interpolated normals can turn away from a viewer who sees the surface at a grazing angle;
+    /// the geometric normal then stands in, as no mirror shows its back.
+    pub fn facing_normal(&self, wo: Vec3) -> Vec3 {
+        let ng = if self.ng.dot(wo) < 0.0 { -self.ng } else { self.ng };
+        let n = if self.frame.n.dot(ng) < 0.0 { -self.frame.n } else { self.frame.n };
+        if n.dot(wo) > 0.0 { n } else { ng }
+    }
+
     /// The point just off the surface on the side of `d`.
     fn origin(&self, d: Vec3) -> Vec3 {
         self.p + self.ng * self.offset.copysign(self.ng.dot(d))

@@ -448,21 +448,8 @@ mod tests {
             let receiver = Receiver { p, n: if i % 2 == 0 { Vec3::Y } else { Vec3::ZERO } };
             let sample = lights.sample(&s, &receiver, 0.5 + 0.5 * u, v).unwrap();
             let triangle = if sample.point.x > sample.point.z / 2.0 { 0 } else { 1 };
-            let found = Surface {
-                p: sample.point,
-                ng: Vec3::NEG_Y,
-                frame: crate::base::math::Basis::from_normal(Vec3::NEG_Y),
-                uv: Vec2::ZERO,
-                dp_du: Vec3::ZERO,
-                dp_dv: Vec3::ZERO,
-                t: sample.distance,
-                triangle,
-                barycentric: Vec2::ZERO,
-                object: 0,
-                material: 0,
-                emitter: Some(0),
-                offset: 0.0,
-            };
+            let flat = Surface::flat(sample.point, Vec3::NEG_Y);
+            let found = Surface { t: sample.distance, triangle, emitter: Some(0), ..flat };
             assert!((lights.pdf_surface(&s, &receiver, &found) / sample.pdf - 1.0).abs() < 1e-4);
             assert_eq!(lights.emitted(&s, &found, -sample.wi), Rgb::new(1.0, 2.0, 3.0));
             assert_eq!(lights.emitted(&s, &found, sample.wi), Rgb::ZERO);

@@ -17,7 +17,7 @@ use crate::material::bsdf::Lobes;
 use crate::scene::Camera;
 use crate::transport::{Sampler, World};
 use crate::view::gbuffer::GLOSSY;
-use crate::view::mirror::{facing_normal, mirror_direction};
+use crate::view::mirror::mirror_direction;
 use crate::view::mirror_light::glossy_albedo;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -133,7 +133,7 @@ pub fn guides(world: &World, camera: &Camera, mirror_alpha: f32, samples: u32, s
 fn surface_guides(world: &World, s: &Surface, wo: Vec3, mirror_alpha: f32) -> [Guide; 2] {
     let bsdf = &world.scene.materials[s.material as usize].bsdf;
     let wi = s.frame.to_local(wo);
-    let (normal, depth) = (facing_normal(s, wo), s.t);
+    let (normal, depth) = (s.facing_normal(wo), s.t);
     let diffuse = bsdf.diffuse_albedo(s, wi);
     let lobe = bsdf.glossy_albedo(s, wi, GLOSSY);
     let plain = |albedo: Rgb| Guide { normal, depth, albedo, factor: albedo };
@@ -146,7 +146,7 @@ fn surface_guides(world: &World, s: &Surface, wo: Vec3, mirror_alpha: f32) -> [G
         Some(hit) => {
             let there = world.scene.materials[hit.material as usize].bsdf.diffuse_albedo(&hit, hit.frame.to_local(-ray.d));
             let all = there + glossy_albedo(world, &hit, -ray.d);
-            Guide { normal: facing_normal(&hit, -ray.d), depth: depth + hit.t, albedo: all * lobe, factor: lobe * all }
+            Guide { normal: hit.facing_normal(-ray.d), depth: depth + hit.t, albedo: all * lobe, factor: lobe * all }
         }
         None => Guide { normal: Vec3::ZERO, depth: FAR, albedo: lobe, factor: lobe },
     };

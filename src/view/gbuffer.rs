@@ -1,6 +1,5 @@
 //! The G-buffer of a novel view: one ray through each pixel's centre (§5).
 
-use super::mirror::facing_normal;
 use crate::base::math::{Rgb, hash_words};
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
@@ -116,7 +115,7 @@ fn block(world: &World, camera: &Camera, [left, top]: [usize; 2]) -> impl Iterat
 }
 
 fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) -> Pixel {
-    let normal = facing_normal(&surface, wo);
+    let normal = surface.facing_normal(wo);
     Pixel {
         surface,
         wo,

@@ -43,16 +43,6 @@ impl Reflected {
     }
 }
 
-/// The shading normal of `surface`, turned to the side of the viewer at direction `wo` (unit, away from the surface).
-///
-/// Interpolated normals can turn away from a viewer who sees the surface at a grazing angle;
-/// the geometric normal then stands in, as no mirror shows its back.
-pub fn facing_normal(surface: &Surface, wo: Vec3) -> Vec3 {
-    let ng = if surface.ng.dot(wo) < 0.0 { -surface.ng } else { surface.ng };
-    let n = if surface.frame.n.dot(ng) < 0.0 { -surface.frame.n } else { surface.frame.n };
-    if n.dot(wo) > 0.0 { n } else { ng }
-}
-
 /// The mirror hits of a view's glossy pixels; [`Reflected::NONE`] for the others.
 pub fn mirror_pass(world: &World, view: &GBuffer) -> Vec<Reflected> {
     view.pixels
@@ -68,7 +58,7 @@ pub fn mirror_pass(world: &World, view: &GBuffer) -> Vec<Reflected> {
 /// Unit direction in which `surface`, as a mirror, sends the view from `wo` (unit, away from the surface) on.
 pub fn mirror_direction(surface: &Surface, wo: Vec3) -> Vec3 {
     let ng = if surface.ng.dot(wo) < 0.0 { -surface.ng } else { surface.ng };
-    let mut d = reflect(wo, facing_normal(surface, wo));
+    let mut d = reflect(wo, surface.facing_normal(wo));
     if d.dot(ng) <= 0.0 {
         // The interpolated normal bends the ray into the surface.
         d = reflect(wo, ng);

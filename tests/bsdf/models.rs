@@ -19,21 +19,8 @@ pub const PINK: Texture = Texture::Constant(Rgb::new(0.9, 0.6, 0.7));
 pub fn surface(uv: [f32; 2]) -> Surface {
     let (dp_du, dp_dv) = (Vec3::new(1.3, 0.2, 0.0), Vec3::new(-0.1, 0.9, 0.0));
     let n = Vec3::new(0.1, 0.2, 1.0).normalize();
-    Surface {
-        p: Vec3::ZERO,
-        ng: Vec3::Z,
-        frame: Basis::from_normal_and_tangent(n, dp_du),
-        uv: uv.into(),
-        dp_du,
-        dp_dv,
-        t: 1.0,
-        triangle: 0,
-        barycentric: Vec2::ZERO,
-        object: 0,
-        material: 0,
-        emitter: None,
-        offset: 0.0,
-    }
+    let frame = Basis::from_normal_and_tangent(n, dp_du);
+    Surface { frame, uv: uv.into(), dp_du, dp_dv, ..Surface::flat(Vec3::ZERO, Vec3::Z) }
 }
 
 pub fn bitmap(offset: f32, wrap: Wrap, to_uv: Affine2) -> Texture {

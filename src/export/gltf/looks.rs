@@ -3,7 +3,7 @@
 use super::pixels::{self, Picture};
 use super::writer::Writer;
 use crate::Result;
-use crate::base::math::{Basis, Rgb};
+use crate::base::math::Rgb;
 use crate::material::bsdf::{Bsdf, Conductor, Principled};
 use crate::material::image::Image;
 use crate::material::texture::{Bitmap, Wrap};
@@ -163,22 +163,7 @@ fn principled_tint(principled: &Principled) -> Rgb {
 
 /// A point in the middle of a texture.
 fn flat() -> Surface {
-    let frame = Basis { s: Vec3::X, t: Vec3::Y, n: Vec3::Z };
-    Surface {
-        p: Vec3::ZERO,
-        ng: Vec3::Z,
-        frame,
-        uv: Vec2::splat(0.5),
-        dp_du: Vec3::X,
-        dp_dv: Vec3::Y,
-        t: 1.0,
-        triangle: 0,
-        barycentric: Vec2::splat(1.0 / 3.0),
-        object: 0,
-        material: 0,
-        emitter: None,
-        offset: 0.0,
-    }
+    Surface { uv: Vec2::splat(0.5), barycentric: Vec2::splat(1.0 / 3.0), ..Surface::flat(Vec3::ZERO, Vec3::Z) }
 }
 
 /// Reflectance of a metal at normal incidence.

@@ -60,29 +60,14 @@ impl Bsdf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::math::Basis;
     use crate::material::Surface;
     use crate::material::bsdf::{
         Blend, Conductor, Diffuse, Distribution, PlasticParams, Principled, PrincipledParams, RoughConductor, TwoSided,
     };
-    use glam::{Vec2, Vec3};
+    use glam::Vec3;
 
     fn surface() -> Surface {
-        Surface {
-            p: Vec3::ZERO,
-            ng: Vec3::Z,
-            frame: Basis::from_normal(Vec3::Z),
-            uv: Vec2::ZERO,
-            dp_du: Vec3::X,
-            dp_dv: Vec3::Y,
-            t: 1.0,
-            triangle: 0,
-            barycentric: Vec2::ZERO,
-            object: 0,
-            material: 0,
-            emitter: None,
-            offset: 0.0,
-        }
+        Surface::flat(Vec3::ZERO, Vec3::Z)
     }
 
     fn grey(v: f32) -> Texture {

@@ -14,7 +14,7 @@ use crate::scene::Camera;
 use crate::transport::World;
 use crate::transport::bvh::BEAM;
 use crate::view::gbuffer::{GBuffer, Pixel, view_alpha};
-use crate::view::mirror::{Reflected, facing_normal, mirror_hit};
+use crate::view::mirror::{Reflected, mirror_hit};
 use crate::view::mirror_light::mirror_light;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -269,7 +269,7 @@ impl Lit<'_> {
         let Some(alpha) = view_alpha(world, &surface, wo) else {
             return Covered { emission, diffuse, glossy: Rgb::ZERO };
         };
-        let (p, normal) = (surface.p, facing_normal(&surface, wo));
+        let (p, normal) = (surface.p, surface.facing_normal(wo));
         let (reflected, light) = match lightmap.filter(|_| mirrors && alpha == 0.0) {
             Some(map) => mirror_light(world, map, &surface, wo),
             None if alpha <= SHARP_ALPHA => (mirror_hit(world, &surface, wo), Rgb::ZERO),
