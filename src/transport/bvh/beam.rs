@@ -3,10 +3,10 @@
 //! *Ours*: nodes are asked once for all rays, by intervals that hold all of their directions; in the leaves each ray takes the steps that it
 //! takes alone. A box that any of them meets is visited, so the answers are theirs, bit for bit.
 
-use super::traverse::{FAR_SLACK, LEAST_DIRECTION, Sheared, lanes, octant};
+use super::traverse::{FAR_SLACK, LEAST_DIRECTION, Nearest, Sheared, octant, push};
 use super::triangle::Shear;
 use super::wide::{MARK, Node, Tree};
-use super::{Hit, Ray};
+use super::{Facet, Hit, Ray};
 use crate::base::simd::Simd;
 
 /// Most rays of a beam.
@@ -72,15 +72,15 @@ impl<'a> Beam<'a> {
 pub fn closest<S: Simd>(
     s: S,
     tree: &Tree,
+    facets: &[Facet],
     beam: &Beam,
     (entries, ids): (&mut [f32], &mut [u32]),
     passes: &mut dyn FnMut(usize, &Hit) -> bool,
 ) -> [Option<Hit>; BEAM] {
-    let mut best = [None; BEAM];
-    let Some(root) = tree.root else { return best };
-    let mut nearest = [f32::NEG_INFINITY; BEAM];
+    let Some(root) = tree.root else { return [None; BEAM] };
+    let mut nearest = [Nearest { t: f32::NEG_INFINITY, hit: None }; BEAM];
     for (nearest, ray) in nearest.iter_mut().zip(beam.rays) {
-        *nearest = ray.t_max.min(f32::MAX);
+        *nearest = Nearest::within(ray.t_max);
     }
     let order = s.octant_order(beam.octant);
     let mut farthest = greatest(&nearest);
@@ -94,43 +94,25 @@ pub fn closest<S: Simd>(
         let id = ids[top];
         if id & MARK == 0 {
             let node = &tree.nodes[id as usize];
-            let (enter, leave) = beam.slabs(s, node, s.splat(farthest));
-            let mask = s.le_permuted(enter, leave, order);
-            let children = s.pack_ids(s.permute_ids(s.load_ids(&node.children), order), mask);
-            let enter = s.pack(s.permute(enter, order), mask);
-            s.store(enter, entries[top..].first_chunk_mut().expect("room for eight"));
-            s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
-            top += mask.count_ones() as usize;
+            let slabs = beam.slabs(s, node, s.splat(farthest));
+            top = push(s, tree, node, slabs, order, (&mut *entries, &mut *ids), top);
             continue;
         }
         let block = &tree.blocks[(id & !MARK) as usize];
         for (i, ray) in beam.rays.iter().enumerate() {
-            let (mut mask, t, u, v) = Sheared::new(s, &beam.shears[i], ray.t_min).block(s, block, s.splat(nearest[i]));
-            if mask == 0 {
-                continue;
-            }
-            let (t, u, v) = (lanes(s, t), lanes(s, u), lanes(s, v));
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & 7;
-                mask &= mask - 1;
-                let hit = Hit { t: t[lane], triangle: block.ids[lane] & !MARK, u: u[lane], v: v[lane] };
-                let wins = hit.t < nearest[i] || hit.t == nearest[i] && best[i].is_none_or(|b: Hit| hit.triangle < b.triangle);
-                if wins && !(block.ids[lane] & MARK != 0 && passes(i, &hit)) {
-                    nearest[i] = hit.t;
-                    best[i] = Some(hit);
-                }
-            }
+            let met = Sheared::new(s, &beam.shears[i], ray.t_min).block(s, block, s.splat(nearest[i].t));
+            nearest[i].take(s, block, met, facets, &mut |hit| passes(i, hit));
         }
         farthest = greatest(&nearest);
     }
-    best
+    nearest.map(|nearest| nearest.hit)
 }
 
 #[inline(always)]
-fn greatest(x: &[f32; BEAM]) -> f32 {
-    let mut most = x[0];
-    for x in &x[1..] {
-        most = if *x > most { *x } else { most };
+fn greatest(nearest: &[Nearest; BEAM]) -> f32 {
+    let mut most = nearest[0].t;
+    for Nearest { t, .. } in &nearest[1..] {
+        most = if *t > most { *t } else { most };
     }
     most
 }

@@ -106,7 +106,7 @@ impl Bvh {
         match Beam::new(rays).filter(|_| self.rounds.is_none() && self.tree.stack <= STACK) {
             Some(beam) => {
                 let passes = &mut |ray: usize, hit: &Hit| passes(scene, &rays[ray], hit);
-                let found = self.lanes.run(Together(&self.tree, &beam, passes));
+                let found = self.lanes.run(Together(&self.tree, facets, &beam, passes));
                 hits.iter_mut().zip(found).for_each(|(to, hit)| *to = hit);
             }
             None => hits.iter_mut().zip(rays).for_each(|(to, ray)| *to = self.closest(scene, facets, ray)),
@@ -185,15 +185,15 @@ impl Kernel for Closest<'_> {
 }
 
 /// The first hits of a beam, in a tree for which the thread's stack is deep enough.
-struct Together<'a>(&'a Tree, &'a Beam<'a>, &'a mut dyn FnMut(usize, &Hit) -> bool);
+struct Together<'a>(&'a Tree, &'a [Facet], &'a Beam<'a>, &'a mut dyn FnMut(usize, &Hit) -> bool);
 
 impl Kernel for Together<'_> {
     type Output = [Option<Hit>; BEAM];
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> [Option<Hit>; BEAM] {
-        let Self(tree, beam, passes) = self;
-        STACKS.with_borrow_mut(|(entries, ids)| beam::closest(s, tree, beam, (entries, ids), passes))
+        let Self(tree, facets, beam, passes) = self;
+        STACKS.with_borrow_mut(|(entries, ids)| beam::closest(s, tree, facets, beam, (entries, ids), passes))
     }
 }
 

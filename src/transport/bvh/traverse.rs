@@ -123,50 +123,89 @@ pub fn closest<S: Simd>(
 ) -> Option<Hit> {
     let r = Prepared::new(s, ray, octant(ray));
     let (entries, ids) = stack;
-    // A triangle so thin that its distance overflows is no hit: hence not infinity.
-    let mut nearest = ray.t_max.min(f32::MAX);
-    let mut best: Option<Hit> = None;
+    let mut nearest = Nearest::within(ray.t_max);
     entries[0] = ray.t_min;
     ids[0] = tree.root?;
     let mut top = 1;
     while top > 0 {
         top -= 1;
-        if entries[top] > nearest {
+        if entries[top] > nearest.t {
             continue;
         }
         let id = ids[top];
         if id & MARK == 0 {
             let node = &tree.nodes[id as usize];
-            let (enter, leave) = r.slabs(s, node, s.splat(nearest));
-            let mask = s.le_permuted(enter, leave, r.order);
-            let children = s.pack_ids(s.permute_ids(s.load_ids(&node.children), r.order), mask);
-            let enter = s.pack(s.permute(enter, r.order), mask);
-            s.store(enter, entries[top..].first_chunk_mut().expect("room for eight"));
-            s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
-            let end = top + mask.count_ones() as usize;
-            prefetch_all(tree, &ids[top..end]);
-            top = end;
+            let slabs = r.slabs(s, node, s.splat(nearest.t));
+            top = push(s, tree, node, slabs, r.order, (&mut *entries, &mut *ids), top);
         } else {
             let block = &tree.blocks[(id & !MARK) as usize];
-            let (mut mask, t, u, v) = r.triangles.block(s, block, s.splat(nearest));
-            if mask == 0 {
-                continue;
-            }
-            let (t, u, v) = (lanes(s, t), lanes(s, u), lanes(s, v));
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & 7;
-                mask &= mask - 1;
-                let hit = Hit { t: t[lane], triangle: block.ids[lane] & !MARK, u: u[lane], v: v[lane] };
-                let wins = hit.t < nearest || hit.t == nearest && best.is_none_or(|b| hit.triangle < b.triangle);
-                if wins && !(block.ids[lane] & MARK != 0 && passes(&hit)) {
-                    nearest = hit.t;
-                    best = Some(hit);
-                    prefetch_at(facets, hit.triangle as usize);
-                }
+            nearest.take(s, block, r.triangles.block(s, block, s.splat(nearest.t)), facets, passes);
+        }
+    }
+    nearest.hit
+}
+
+/// Puts the children of a node that are met, entered and left as `slabs` says, on the stack, the first in `order` lowest; its new height.
+#[inline(always)]
+pub(super) fn push<S: Simd>(
+    s: S,
+    tree: &Tree,
+    node: &Node,
+    (enter, leave): (S::F, S::F),
+    order: S::I,
+    (entries, ids): (&mut [f32], &mut [u32]),
+    top: usize,
+) -> usize {
+    let mask = s.le_permuted(enter, leave, order);
+    let children = s.pack_ids(s.permute_ids(s.load_ids(&node.children), order), mask);
+    let enter = s.pack(s.permute(enter, order), mask);
+    s.store(enter, entries[top..].first_chunk_mut().expect("room for eight"));
+    s.store_ids(children, ids[top..].first_chunk_mut().expect("room for eight"));
+    let end = top + mask.count_ones() as usize;
+    prefetch_all(tree, &ids[top..end]);
+    end
+}
+
+/// The closest hit of a ray so far.
+#[derive(Clone, Copy)]
+pub(super) struct Nearest {
+    /// Its distance; before there is any, how far the ray goes.
+    pub(super) t: f32,
+    pub(super) hit: Option<Hit>,
+}
+
+impl Nearest {
+    /// None as yet. A triangle so thin that its distance overflows is no hit: hence not infinity.
+    #[inline(always)]
+    pub(super) fn within(t_max: f32) -> Self {
+        Self { t: t_max.min(f32::MAX), hit: None }
+    }
+
+    /// Takes what [`Sheared::block`] says of a block, but for what `passes` waves through. Of two at one distance, the lower index wins.
+    #[inline(always)]
+    pub(super) fn take<S: Simd>(
+        &mut self,
+        s: S,
+        block: &Block,
+        (mut mask, t, u, v): (u32, S::F, S::F, S::F),
+        facets: &[Facet],
+        passes: &mut dyn FnMut(&Hit) -> bool,
+    ) {
+        if mask == 0 {
+            return;
+        }
+        let (t, u, v) = (lanes(s, t), lanes(s, u), lanes(s, v));
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 7;
+            mask &= mask - 1;
+            let hit = Hit { t: t[lane], triangle: block.ids[lane] & !MARK, u: u[lane], v: v[lane] };
+            let wins = hit.t < self.t || hit.t == self.t && self.hit.is_none_or(|b| hit.triangle < b.triangle);
+            if wins && !(block.ids[lane] & MARK != 0 && passes(&hit)) {
+                *self = Self { t: hit.t, hit: Some(hit) };
+                prefetch_at(facets, hit.triangle as usize);
             }
         }
     }
-    best
 }
 
 /// Whether there is any hit that `passes` does not wave through.
@@ -236,7 +275,7 @@ fn splat3<S: Simd>(s: S, x: [f32; 3]) -> [S::F; 3] {
 }
 
 #[inline(always)]
-pub(super) fn lanes<S: Simd>(s: S, x: S::F) -> [f32; 8] {
+fn lanes<S: Simd>(s: S, x: S::F) -> [f32; 8] {
     let mut out = [0.0; 8];
     s.store(x, &mut out);
     out
