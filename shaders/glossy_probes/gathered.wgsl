@@ -1,4 +1,4 @@
-// Twin of src/method/glossy_probes/gather.rs: Gathered.
+// Twin of src/method/glossy_probes/blend.rs: Gathered.
 // What the gather leaves of a pixel, in two vectors: each is read and written at once.
 
 struct Gathered {

@@ -8,7 +8,7 @@ use crate::lightmap::{fill, receivers};
 use crate::material::bsdf::{Distribution, Lobes, albedo, microfacet, principled, roughplastic};
 use crate::material::surface;
 use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gpu_gather};
-use crate::method::glossy_probes::{coverage, filter, footprint, perturb, previous, search};
+use crate::method::glossy_probes::{coverage, filter, footprint, gather_params, perturb, previous};
 use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
 use crate::method::many_light::{
     adaptive, bounce, descend, disc, emit, follow, gather as many_lights_gather, params as many_light_params,
@@ -92,8 +92,8 @@ fn twins(file: &str) -> Twins {
             MIN_DISTANCE = perturb::MIN_DISTANCE;
         },
         "glossy_probes/search.wgsl" => twins! {
-            TILE = search::TILE;
-            ANCHOR_TOLERANCE = search::ANCHOR_TOLERANCE.0, search::ANCHOR_TOLERANCE.1;
+            TILE = gather_params::TILE;
+            ANCHOR_TOLERANCE = gather_params::ANCHOR_TOLERANCE.0, gather_params::ANCHOR_TOLERANCE.1;
             DERIVATIVE_MIN = qhmap::DERIVATIVE_MIN;
         },
         "glossy_probes/gather.wgsl" => twins! {

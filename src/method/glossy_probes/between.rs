@@ -1,6 +1,7 @@
 //! Pixels between anchors, eight at a time: each begins where the anchors around it ended, and looks around there by the finest level.
 
-use super::search::{ANCHOR_TOLERANCE, Sample, Samples, TILE};
+use super::gather_params::{ANCHOR_TOLERANCE, TILE};
+use super::samples::{Sample, Samples};
 use super::window::{Sought, Target, Targets, Texels, Window};
 use crate::base::simd::Simd;
 use crate::base::simd::lane::{F8, M8, V2};

@@ -1,8 +1,8 @@
 //! Eq. 2 (§5.2): the colours that eight probes have for a pixel, weighted by how well they match.
 
 use super::candidates::{Light, WeightedProbe};
-use super::gather::{BilinearRule, GatherParams, Gathered};
-use super::search::Samples;
+use super::gather_params::{BilinearRule, GatherParams};
+use super::samples::Samples;
 use crate::base::math::Rgb;
 use crate::base::simd::Simd;
 use crate::base::simd::functions::exp_down;
@@ -11,6 +11,22 @@ use glam::Vec2;
 
 /// Share of the largest weight below which a sample is not fetched: less than what rounding takes of the sum.
 const NEGLIGIBLE: f32 = 1e-12;
+
+/// A gathered pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gathered {
+    /// Glossy radiance at the probes' reduced roughness (Eq. 2); black where `energy` is infinite.
+    pub color: Rgb,
+    /// Least energy among the probes' samples; infinite where no probe had a valid sample.
+    pub energy: f32,
+    /// The probe whose sample that was, and its texel coordinate; for inspection.
+    pub best: Option<(usize, Vec2)>,
+}
+
+impl Gathered {
+    /// Nothing was found.
+    pub const NONE: Self = Self { color: Rgb::ZERO, energy: f32::INFINITY, best: None };
+}
 
 /// Eq. 2. `albedo` is the view's, where the ratio of albedos is asked for.
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Where a reflector shows a point to another eye: specular path perturbation.
 //!
 //! *Paper* (§5.1): Δx = J Δp + [Δp]ᵀ H [Δp], after Chen and Arvo 2000. *Reading*: their H is the second derivative, so the series needs
-//! the factor 1/2, which lives in [`Paths::reflection_points`] (`second * 0.5`).
+//! the factor 1/2, which lives in [`super::perturb_lanes`] (`second * half`).
 //!
 //! Derivation. Near x the reflector is s(u) = x + T u - n uᵀKu / 2 with T = (d1, d2) and K = diag(k1, k2). Of all paths p-s-q the light takes
 //! the one of stationary length (Fermat): F(u, p) = ∂/∂u (|s - p| + |s - q|) = 0, and u is a function of p where ∂F/∂u is regular
@@ -27,11 +27,9 @@
 //! (the second-order part longer than the first) is cut there; where a concave reflector focuses the eye onto q
 //! (G singular), and for broken input, the reflector counts as a plane.
 
-use super::perturb_lanes::{Paths, Points};
 use crate::Result;
 use crate::base::math::{Basis, reflect};
 use crate::base::named::within;
-use crate::base::simd::Lanes;
 use crate::surface::Curvature;
 use glam::{Mat2, Vec2, Vec3};
 
@@ -138,12 +136,6 @@ impl Perturbation {
             (k, g) = (Vec2::ZERO, g_plane);
         }
         Self { frame, x, p, e, inv_rp, inv_rq, k, g_inverse: g.inverse(), params: *params }
-    }
-
-    /// x': where the reflector shows the same point q to the eye at `p`. Always finite for finite input.
-    pub fn reflection_point(&self, p: Vec3) -> Vec3 {
-        let [x, y, z] = Lanes::chosen().run(Points { paths: &Paths::new(&[*self; 8]), p }).map(|axis| axis[0]);
-        Vec3::new(x, y, z)
     }
 
     /// Unit direction from x in which the path goes on.

@@ -2,7 +2,7 @@
 
 use super::perturb::{MAX_STEP, MIN_DISTANCE, Order, PerturbParams, Perturbation};
 use crate::base::simd::lane::{F8, M8, V2, V3};
-use crate::base::simd::{Kernel, Simd};
+use crate::base::simd::{Kernel, Lanes, Simd};
 use glam::Vec3;
 
 /// Eight paths from one eye, field by field.
@@ -20,10 +20,18 @@ pub(crate) struct Paths {
     params: PerturbParams,
 }
 
+impl Perturbation {
+    /// x': where the reflector shows the same point q to the eye at `p`. Always finite for finite input.
+    pub fn reflection_point(&self, p: Vec3) -> Vec3 {
+        let [x, y, z] = Lanes::chosen().run(Points { paths: &Paths::new(&[*self; 8]), p }).map(|axis| axis[0]);
+        Vec3::new(x, y, z)
+    }
+}
+
 /// Their points x' for the eye at `p`, axis by axis.
-pub(crate) struct Points<'a> {
-    pub(crate) paths: &'a Paths,
-    pub(crate) p: Vec3,
+struct Points<'a> {
+    paths: &'a Paths,
+    p: Vec3,
 }
 
 impl Kernel for Points<'_> {

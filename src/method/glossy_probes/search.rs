@@ -6,20 +6,15 @@
 
 use super::between::{Anchors, Begin, Block};
 use super::candidates::WeightedProbe;
-use super::gather::GatherParams;
+use super::gather_params::{GatherParams, TILE};
 use super::perturb::Perturbation;
 use super::perturb_lanes::Paths;
+use super::samples::Samples;
 use super::window::{Target, Texels, windows};
 use crate::base::simd::{Kernel, Lanes, Simd};
 use crate::view::gbuffer::{GBuffer, Pixel};
 use crate::view::mirror::{NOTHING, Reflected};
-use glam::{Vec2, Vec3};
-
-/// Most samples to each side of a search's centre.
-pub const MAX_RADIUS: i32 = 15;
-
-/// Side of a tile of pixels: what their searches read of a probe, some 100 KB, fits into a core's cache.
-pub(crate) const TILE: usize = 16;
+use glam::Vec3;
 
 /// The glossy pixels of a view that reflect something, with their indices, square by square: neighbours search the same texels of a
 /// probe, which then stay in the cache.
@@ -39,42 +34,6 @@ pub(crate) fn tile<'a>(view: &'a GBuffer, reflected: &[Reflected], [x, y]: [usiz
     let rows = y..(y + TILE).min(height);
     rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x)).filter_map(glossy).collect()
 }
-
-/// What one probe offers a pixel.
-#[derive(Debug, Clone, Copy)]
-pub struct Sample {
-    /// Its energy (Eq. 1).
-    pub energy: f32,
-    /// Its continuous texel coordinate.
-    pub texel: Vec2,
-}
-
-/// What eight probes offer a pixel.
-#[derive(Debug, Clone, Copy)]
-pub struct Samples {
-    /// Energies; infinite where a probe has nothing.
-    pub energy: [f32; 8],
-    /// Continuous texel coordinates, x and y.
-    pub texel: [[f32; 8]; 2],
-}
-
-impl Samples {
-    const NONE: Self = Self { energy: [f32::INFINITY; 8], texel: [[0.0; 8]; 2] };
-
-    /// That of one probe.
-    pub fn of(&self, k: usize) -> Option<Sample> {
-        let energy = self.energy[k];
-        energy.is_finite().then(|| Sample { energy, texel: Vec2::new(self.texel[0][k], self.texel[1][k]) })
-    }
-
-    pub(crate) fn set(&mut self, k: usize, sample: Sample) {
-        self.energy[k] = sample.energy;
-        (self.texel[0][k], self.texel[1][k]) = (sample.texel.x, sample.texel.y);
-    }
-}
-
-/// How much worse than its anchor a pixel's sample may be before it is searched for in full: a factor, and an addend.
-pub(crate) const ANCHOR_TOLERANCE: (f32, f32) = (3.0, 0.1);
 
 /// The sample of least energy of each of `probes` (at most eight), for each pixel of one of [`tiles`], as `eye` sees it. `width`
 /// is the view's.

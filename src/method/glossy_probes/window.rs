@@ -1,8 +1,8 @@
 //! Eight texels of a probe at a time: their energies (Eq. 1), and the least of a window of them.
 
 use super::candidates::WeightedProbe;
-use super::gather::{GatherParams, SearchLevel};
-use super::search::{MAX_RADIUS, Sample};
+use super::gather_params::{GatherParams, MAX_RADIUS, SearchLevel};
+use super::samples::Sample;
 use crate::base::simd::Simd;
 use crate::base::simd::functions::{acos, atan2};
 use crate::base::simd::lane::{F8, M8, V2, V3};
