@@ -115,8 +115,6 @@ pub trait Simd: Copy {
     fn add_ids(self, a: Self::I, b: Self::I) -> Self::I;
     /// a b, wrapping.
     fn mul_ids(self, a: Self::I, b: Self::I) -> Self::I;
-    /// The lesser, without signs.
-    fn min_ids(self, a: Self::I, b: Self::I) -> Self::I;
     /// a and b, bit by bit.
     fn and_ids(self, a: Self::I, b: Self::I) -> Self::I;
     /// a times two to the power of `BITS`.

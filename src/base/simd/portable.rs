@@ -165,10 +165,6 @@ impl Simd for Portable {
         std::array::from_fn(|i| a[i].wrapping_mul(b[i]))
     }
     #[inline(always)]
-    fn min_ids(self, a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
-        std::array::from_fn(|i| a[i].min(b[i]))
-    }
-    #[inline(always)]
     fn and_ids(self, a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
         std::array::from_fn(|i| a[i] & b[i])
     }

@@ -126,10 +126,6 @@ macro_rules! common {
             unsafe { _mm256_mullo_epi32(a, b) }
         }
         #[inline(always)]
-        fn min_ids(self, a: __m256i, b: __m256i) -> __m256i {
-            unsafe { _mm256_min_epu32(a, b) }
-        }
-        #[inline(always)]
         fn and_ids(self, a: __m256i, b: __m256i) -> __m256i {
             unsafe { _mm256_and_si256(a, b) }
         }
@@ -146,7 +142,7 @@ macro_rules! common {
             assert!(from.len() >= 4, "nothing to load from");
             let last = u32::try_from(from.len() - 4).unwrap_or(u32::MAX);
             let mut offsets = [0; 8];
-            self.store_ids(self.min_ids(at, self.splat_ids(last)), &mut offsets);
+            self.store_ids(unsafe { _mm256_min_epu32(at, self.splat_ids(last)) }, &mut offsets);
             unsafe {
                 // In bounds: no offset is past the last at which there are four.
                 let p = from.as_ptr();
@@ -170,7 +166,7 @@ macro_rules! common {
             assert!(!from.is_empty(), "nothing to load from");
             let last = u32::try_from(from.len() - 1).unwrap_or(u32::MAX);
             let mut o = [0; 8];
-            self.store_ids(self.min_ids(at, self.splat_ids(last)), &mut o);
+            self.store_ids(unsafe { _mm256_min_epu32(at, self.splat_ids(last)) }, &mut o);
             // In bounds: no place is past the last.
             unsafe {
                 let p = from.as_ptr().cast::<i32>();
