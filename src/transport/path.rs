@@ -151,7 +151,7 @@ pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sam
         return world.seen(ray).map_or(Rgb::ZERO, of);
     }
     let from = Receiver { p: ray.o, n: Vec3::ZERO };
-    let start = Start { ray: *ray, from, pdf: 1.0, delta: true, eta: 1.0, depth: 0 };
+    let start = Start { ray: *ray, from, found: Found { pdf: 1.0, delta: true }, eta: 1.0, depth: 0 };
     keep_finite(incident(world, start, None, params, sampler))
 }
 
@@ -172,7 +172,7 @@ fn past_emitters(world: &World, mut surface: Surface, mut wo: Vec3, params: &Pat
         let ray = surface.spawn(surface.frame.to_world(sample.wo));
         if sample.wo.z * wi.z > 0.0 {
             let from = Receiver { p: surface.p, n: Vec3::ZERO };
-            let start = Start { ray, from, pdf: sample.pdf, delta: true, eta: sample.eta, depth: depth + 1 };
+            let start = Start { ray, from, found: Found { pdf: sample.pdf, delta: true }, eta: sample.eta, depth: depth + 1 };
             return keep_finite(sum + throughput * incident(world, start, None, params, sampler));
         }
         let Some(next) = world.intersect(&ray) else { return sum };
@@ -221,14 +221,20 @@ struct Start {
     ray: Ray,
     /// For whom the emitter sample that competes with it was drawn.
     from: Receiver,
-    /// Density with which `ray.d` was drawn at `ray.o`.
-    pdf: f32,
-    /// No emitter sample competes with it.
-    delta: bool,
+    found: Found,
     /// Relative index of refraction so far.
     eta: f32,
     /// Vertices that have scattered before it.
     depth: u32,
+}
+
+/// How a ray was found.
+#[derive(Clone, Copy)]
+pub(super) struct Found {
+    /// Density with which its direction was drawn at its origin.
+    pub(super) pdf: f32,
+    /// No emitter sample competes with it.
+    pub(super) delta: bool,
 }
 
 /// One sample of the integral of incident radiance at the first vertex of a path.
@@ -246,7 +252,7 @@ fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, 
     }
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
         let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
-        let start = Start { ray, from, pdf: sample.pdf, delta: sample.delta, eta: sample.eta, depth: 1 };
+        let start = Start { ray, from, found: Found { pdf: sample.pdf, delta: sample.delta }, eta: sample.eta, depth: 1 };
         sum += sample.weight * incident(vertex.world, start, known, params, sampler);
     }
     keep_finite(sum)
@@ -254,7 +260,7 @@ fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, 
 
 /// Radiance along a ray: emission weighted against the emitter sampling at its origin, and all that is scattered on.
 fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &PathParams, sampler: &mut Sampler) -> Rgb {
-    let Start { mut ray, mut from, mut pdf, mut delta, mut eta, mut depth } = start;
+    let Start { mut ray, mut from, mut found, mut eta, mut depth } = start;
     let mut sum = Rgb::ZERO;
     let mut throughput = Rgb::ONE;
     loop {
@@ -262,20 +268,15 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
         let [light_x, light_y, light_choice, live] = sampler.next_4d();
         world.lights.prefetch(light_choice, Vec2::new(light_x, light_y));
         let Some(surface) = world.intersect(&ray) else {
-            let light = world.lights.environment(ray.d);
-            if light != Rgb::ZERO {
-                let other = if delta { 0.0 } else { world.lights.pdf_environment(ray.d) };
-                sum += throughput * light * power_heuristic(pdf, other);
-            }
-            return sum;
+            let (light, weight) = environment_met(world, ray.d, found);
+            return sum + throughput * light * weight;
         };
         world.lights.prefetch_radiance(light_choice, Vec2::new(light_x, light_y));
         world.prefetch(&surface);
         let wo = -ray.d;
         if surface.emitter.is_some() {
-            let light = world.lights.emitted(&world.scene, &surface, wo);
-            let other = if delta { 0.0 } else { world.lights.pdf_surface(&world.scene, &from, &surface) };
-            sum += throughput * light * power_heuristic(pdf, other);
+            let (light, weight) = emission_met(world, &surface, wo, &from, found);
+            sum += throughput * light * weight;
         }
         if depth >= params.max_depth {
             return sum;
@@ -298,15 +299,37 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
         eta *= sample.eta;
         depth += 1;
         if depth >= params.rr_depth {
-            let survival = (throughput.max_element() * eta * eta * ROULETTE_MERCY).min(ROULETTE_CAP);
-            if live >= survival {
+            let lives = survival(throughput, eta);
+            if live >= lives {
                 return sum;
             }
-            throughput /= survival;
+            throughput /= lives;
         }
-        (pdf, delta) = (sample.pdf, sample.delta);
+        found = Found { pdf: sample.pdf, delta: sample.delta };
         ray = surface.spawn(surface.frame.to_world(sample.wo));
     }
+}
+
+/// The roulette's probability that a path goes on, by what has become of its radiance and the relative index of refraction.
+pub(super) fn survival(throughput: Rgb, eta: f32) -> f32 {
+    (throughput.max_element() * eta * eta * ROULETTE_MERCY).min(ROULETTE_CAP)
+}
+
+/// Radiance that a ray in direction `d` meets where it leaves the scene, and its weight against emitter sampling.
+pub(super) fn environment_met(world: &World, d: Vec3, found: Found) -> (Rgb, f32) {
+    let light = world.lights.environment(d);
+    if light == Rgb::ZERO {
+        return (light, 0.0);
+    }
+    let other = if found.delta { 0.0 } else { world.lights.pdf_environment(d) };
+    (light, power_heuristic(found.pdf, other))
+}
+
+/// Radiance that an emitting surface sends along a ray, to `wo`, and its weight against emitter sampling for `from`.
+pub(super) fn emission_met(world: &World, surface: &Surface, wo: Vec3, from: &Receiver, found: Found) -> (Rgb, f32) {
+    let light = world.lights.emitted(&world.scene, surface, wo);
+    let other = if found.delta { 0.0 } else { world.lights.pdf_surface(&world.scene, from, surface) };
+    (light, power_heuristic(found.pdf, other))
 }
 
 impl Vertex<'_> {
@@ -371,7 +394,7 @@ impl Vertex<'_> {
 }
 
 /// Weight of a sample of density `a` where another technique would have found it with density `b`.
-pub(super) fn power_heuristic(a: f32, b: f32) -> f32 {
+fn power_heuristic(a: f32, b: f32) -> f32 {
     let ratio = b / a;
     1.0 / (1.0 + ratio * ratio)
 }

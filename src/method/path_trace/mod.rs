@@ -110,23 +110,25 @@ struct Samples<'a> {
 
 impl<'a> Samples<'a> {
     fn new(camera: &'a Camera, params: &PathTraceParams, seed: u32, frame: u32) -> Self {
-        let of = |filter| camera.size.map(|side| FilterSamples::new(filter, side));
-        Self { camera, filter: (params.filter != Filter::Box).then(|| of(params.filter)), seed, frame }
+        let sides = || camera.size.map(|side| FilterSamples::new(params.filter, side));
+        Self { camera, filter: (params.filter != Filter::Box).then(sides), seed, frame }
     }
 
-    /// The ray of sample `index` of a pixel, its weight, and the numbers that are left to it.
-    fn at(&self, x: u32, y: u32, index: u32) -> (Ray, f32, Sampler) {
+    /// Those of a pixel, by their index: the ray, its weight, and the numbers that are left to it.
+    fn of(&self, x: u32, y: u32) -> impl Fn(u32) -> (Ray, f32, Sampler) {
         let stream = hash_words(&[self.seed, self.frame, y * self.camera.size[0] + x]);
-        let mut sampler = Sampler::new(stream, index);
-        let [dx, dy, lens_x, lens_y] = sampler.next_4d();
-        let (at, weight) = match &self.filter {
-            None => (Vec2::new(x as f32 + dx, y as f32 + dy), 1.0),
-            Some([across, down]) => {
-                let ((at_x, weight_x), (at_y, weight_y)) = (across.sample(x, dx), down.sample(y, dy));
-                (Vec2::new(at_x, at_y), weight_x * weight_y)
-            }
-        };
-        (self.camera.ray(at, Vec2::new(lens_x, lens_y)), weight, sampler)
+        move |index| {
+            let mut sampler = Sampler::new(stream, index);
+            let [dx, dy, lens_x, lens_y] = sampler.next_4d();
+            let (at, weight) = match &self.filter {
+                None => (Vec2::new(x as f32 + dx, y as f32 + dy), 1.0),
+                Some([across, down]) => {
+                    let ((at_x, weight_x), (at_y, weight_y)) = (across.sample(x, dx), down.sample(y, dy));
+                    (Vec2::new(at_x, at_y), weight_x * weight_y)
+                }
+            };
+            (self.camera.ray(at, Vec2::new(lens_x, lens_y)), weight, sampler)
+        }
     }
 
     /// Means of `N` quantities over the samples of every pixel.
@@ -138,9 +140,9 @@ impl<'a> Samples<'a> {
     ) -> Vec<[Rgb; N]> {
         let [width, height] = self.camera.size;
         let pixel = |x: u32, y: u32| {
-            let mut sums = [DVec3::ZERO; N];
+            let (sample_at, mut sums) = (self.of(x, y), [DVec3::ZERO; N]);
             for index in 0..spp {
-                let (ray, weight, mut sampler) = self.at(x, y, index);
+                let (ray, weight, mut sampler) = sample_at(index);
                 for (sum, value) in sums.iter_mut().zip(sample(&ray, &mut sampler)) {
                     *sum += (value * weight).as_dvec3();
                 }

@@ -66,10 +66,10 @@ pub(super) fn image<const N: usize>(
             let tally = learns.then(|| tally.empty());
             let mut walk = Walk { world, params: &params.path, plan: plan.as_ref(), tally };
             for (i, (pixel, weights)) in pixels.iter_mut().zip(weights).enumerate() {
-                let [x, y] = [(i % width) as u32, (band * rows + i / width) as u32];
+                let sample_at = samples.of((i % width) as u32, (band * rows + i / width) as u32);
                 (pixel.pass, pixel.squares, pixel.cost) = (zero, zero, 0.0);
                 for index in range.clone() {
-                    let (ray, weight, mut sampler) = samples.at(x, y, index);
+                    let (ray, weight, mut sampler) = sample_at(index);
                     let (layers, cost) = trace(&mut walk, &ray, weights, &mut sampler);
                     pixel.add(&layers.map(|x| (x * weight).as_dvec3()), cost);
                 }

@@ -21,5 +21,5 @@
 mod moments;
 mod walk;
 
-pub use moments::{Moments, Tally};
-pub use walk::{Estimate, Plan, RAY_COST, Start, Walk};
+pub use moments::{Estimate, Moments, RAY_COST, Tally};
+pub use walk::{Plan, Start, Walk};

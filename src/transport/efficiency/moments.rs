@@ -1,9 +1,9 @@
 //! What estimates of scattered radiance were like, by place and direction: second moment, variance, cost.
 
-use super::walk::Estimate;
-use crate::base::math::{Rgb, hash64};
+use crate::base::math::{Rgb, floor, hash64};
+use crate::base::octahedral;
 use crate::material::Surface;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3Swizzles};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -64,7 +64,7 @@ impl Grid {
 
     fn cell(&self, s: &Surface, wo: Option<Vec3>) -> Cell {
         let p = (s.p - self.corner) * self.per_metre;
-        let at = p.to_array().map(|x| (crate::base::math::floor(x) + COORDINATES / 2).clamp(0, COORDINATES - 1) as u64);
+        let at = p.to_array().map(|x| (floor(x) + COORDINATES / 2).clamp(0, COORDINATES - 1) as u64);
         let n = s.frame.n.abs();
         let axis = if n.x >= n.y && n.x >= n.z { 0 } else { 1 + usize::from(n.z > n.y) };
         let side = 2 * axis as u64 + u64::from(s.frame.n[axis] > 0.0);
@@ -72,16 +72,31 @@ impl Grid {
     }
 }
 
-/// The bin, from 1 on, of a unit direction on the octahedron that is unfolded into a square.
+/// The bin, from 1 on, of a unit direction on the octahedral map about Z.
 fn octahedral_bin(d: Vec3) -> u64 {
-    let q = d / (d.x.abs() + d.y.abs() + d.z.abs());
-    let (mut x, mut y) = (q.x, q.y);
-    if q.z < 0.0 {
-        (x, y) = ((1.0 - q.y.abs()) * 1f32.copysign(q.x), (1.0 - q.x.abs()) * 1f32.copysign(q.y));
-    }
-    let bin = |v: f32| ((v * 0.5 + 0.5) * BINS).clamp(0.0, BINS - 1.0) as u64;
-    1 + bin(x) * BINS as u64 + bin(y)
+    let [x, y] = (octahedral::encode(d.xzy()) * BINS).to_array().map(|v| v.clamp(0.0, BINS - 1.0) as u64);
+    1 + x * BINS as u64 + y
 }
+
+/// Radiance, and what it took to estimate it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Estimate {
+    /// Radiance.
+    pub light: Rgb,
+    /// In the unit of [`RAY_COST`].
+    pub cost: f32,
+}
+
+impl Estimate {
+    pub(super) fn add(&mut self, other: Self, weight: Rgb) {
+        self.light += weight * other.light;
+        self.cost += other.cost;
+    }
+}
+
+/// Cost of a ray with the surface that it meets; of the camera's, too. Costs are in any unit that all share: profiles of five scenes
+/// have these ratios.
+pub const RAY_COST: f32 = 1.2;
 
 /// Estimates of one kind in a cell, or their sums.
 #[derive(Debug, Clone, Copy, Default)]
@@ -241,25 +256,9 @@ impl Hasher for Mixed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::math::Basis;
-    use glam::Vec2;
 
     fn at(p: Vec3, n: Vec3, material: u32) -> Surface {
-        Surface {
-            p,
-            ng: n,
-            frame: Basis::from_normal(n),
-            uv: Vec2::ZERO,
-            dp_du: Vec3::X,
-            dp_dv: Vec3::Y,
-            t: 1.0,
-            triangle: 0,
-            barycentric: Vec2::ZERO,
-            object: 0,
-            material,
-            emitter: None,
-            offset: 0.0,
-        }
+        Surface { material, ..Surface::flat(p, n) }
     }
 
     /// A tally over a metre each way, with `count` estimates at `s` of either kind, whose light is 1, 3, 1, 3, ...

@@ -1,12 +1,12 @@
 //! Paths that branch: one estimate of scattered radiance is a tree of vertices.
 
-use super::moments::{Kind, Moments, Tally};
+use super::moments::{Estimate, Kind, Moments, RAY_COST, Tally};
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::transport::light_tree::Receiver;
-use crate::transport::path::{Measure, PathParams, ROULETTE_CAP, ROULETTE_MERCY, Vertex, keep_finite, power_heuristic};
+use crate::transport::path::{Found, Measure, PathParams, Vertex, emission_met, environment_met, keep_finite, survival};
 use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
 
@@ -17,6 +17,9 @@ const ESTIMATES: [f32; 2] = [0.05, 4.0];
 /// one before, and the stack has an end.
 const DEEP: u32 = 64;
 
+/// Most estimates there.
+const AT_MOST_DEEP: f32 = 0.5;
+
 /// What continuations of a path's vertices go by.
 #[derive(Debug)]
 pub struct Plan {
@@ -25,26 +28,6 @@ pub struct Plan {
     /// sqrt(C / V): cost and mean relative variance of one sample of a pixel.
     pub efficiency: f32,
 }
-
-/// Radiance, and what it took to estimate it.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Estimate {
-    /// Radiance.
-    pub light: Rgb,
-    /// In the unit of [`RAY_COST`].
-    pub cost: f32,
-}
-
-impl Estimate {
-    fn add(&mut self, other: Self, weight: Rgb) {
-        self.light += weight * other.light;
-        self.cost += other.cost;
-    }
-}
-
-/// Cost of a ray with the surface that it meets; of the camera's, too. Costs are in any unit that all share: profiles of five scenes
-/// have these ratios.
-pub const RAY_COST: f32 = 1.2;
 
 /// Cost of an emitter sample with its shadow ray.
 const DIRECT_COST: f32 = 0.8;
@@ -124,14 +107,14 @@ impl Walk<'_> {
             self.record(&reached, Kind::Direct, &estimate);
             sum.add(estimate, share);
         }
-        let mut numbers = sampler.next_4d();
+        let numbers = sampler.next_4d();
         let share = 1.0 / onward;
         for k in 0..(onward + numbers[3]) as u32 {
             let estimate = if k == 0 {
                 self.onward(&vertex, &from, &reached, numbers, share, sampler)
             } else {
                 let mut branch = sampler.branch(k << 16 | 1 << 15 | start.depth);
-                numbers = branch.next_4d();
+                let numbers = branch.next_4d();
                 self.onward(&vertex, &from, &reached, numbers, share, &mut branch)
             };
             sum.add(estimate, Rgb::splat(share));
@@ -162,38 +145,38 @@ impl Walk<'_> {
         };
         let mut weight = at.start.weight * sample.weight * share;
         let (eta, depth) = (at.start.eta * sample.eta, at.start.depth + 1);
-        let mut survival = 1.0;
+        let mut lives = 1.0;
         if self.plan.is_none() && depth >= self.params.rr_depth.min(DEEP) {
-            let most = if depth > DEEP { 0.5 } else { ROULETTE_CAP };
-            survival = (weight.max_element() * eta * eta * ROULETTE_MERCY).min(most);
-            if live >= survival {
+            lives = survival(weight, eta);
+            if depth > DEEP {
+                lives = lives.min(AT_MOST_DEEP);
+            }
+            if live >= lives {
                 return Estimate { light: Rgb::ZERO, cost: DRAW_COST };
             }
-            weight /= survival;
+            weight /= lives;
         }
         let ray = at.s.spawn(at.s.frame.to_world(sample.wo));
-        let found = (sample.pdf, sample.delta);
+        let found = Found { pdf: sample.pdf, delta: sample.delta };
         let next = self.incident(&ray, from, found, Start { weight, eta, depth }, sampler);
         let estimate = Estimate { light: keep_finite(sample.weight * next.light), cost: RAY_COST + next.cost };
         self.record(at, Kind::Onward, &estimate);
-        Estimate { light: estimate.light / survival, ..estimate }
+        Estimate { light: estimate.light / lives, ..estimate }
     }
 
     /// Radiance along a ray: emission, weighted against the emitter sampling at its origin, and what is scattered there.
-    fn incident(&mut self, ray: &Ray, from: &Receiver, (pdf, delta): (f32, bool), at: Start, sampler: &mut Sampler) -> Estimate {
+    fn incident(&mut self, ray: &Ray, from: &Receiver, found: Found, at: Start, sampler: &mut Sampler) -> Estimate {
         let world = self.world;
         let numbers = self.emitter_numbers(sampler);
         let Some(s) = world.intersect(ray) else {
-            let light = world.lights.environment(ray.d);
-            let other = if delta || light == Rgb::ZERO { 0.0 } else { world.lights.pdf_environment(ray.d) };
-            return Estimate { light: light * power_heuristic(pdf, other), cost: 0.0 };
+            let (light, weight) = environment_met(world, ray.d, found);
+            return Estimate { light: light * weight, cost: 0.0 };
         };
         let wo = -ray.d;
         let mut sum = Estimate::default();
         if s.emitter.is_some() {
-            let light = world.lights.emitted(&world.scene, &s, wo);
-            let other = if delta { 0.0 } else { world.lights.pdf_surface(&world.scene, from, &s) };
-            sum.light = light * power_heuristic(pdf, other);
+            let (light, weight) = emission_met(world, &s, wo, from, found);
+            sum.light = light * weight;
         }
         if at.depth < self.params.max_depth {
             sum.add(self.scattered(numbers, &s, wo, Query::default(), at, sampler), Rgb::ONE);
@@ -207,7 +190,7 @@ impl Walk<'_> {
         if at.start.depth == 0 {
             return [1.0; 2];
         }
-        let most = if at.start.depth > DEEP { 0.5 } else { ESTIMATES[1] };
+        let most = if at.start.depth > DEEP { AT_MOST_DEEP } else { ESTIMATES[1] };
         let Some(moments) = plan.moments.at(at.s, at.direction) else { return [most.min(1.0); 2] };
         let squared = at.start.weight * at.start.weight;
         moments.map(|moment| {
