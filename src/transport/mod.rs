@@ -9,6 +9,7 @@ pub mod light_sample;
 pub mod light_tree;
 mod light_triangle;
 pub mod lights;
+mod met;
 pub mod path;
 mod round_light;
 pub mod sampler;

@@ -7,6 +7,7 @@
 
 use super::light_sample::LightSample;
 use super::light_tree::Receiver;
+use super::met::{Found, emission_met, environment_met, power_heuristic};
 use super::{Sampler, World};
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;
@@ -228,15 +229,6 @@ struct Start {
     depth: u32,
 }
 
-/// How a ray was found.
-#[derive(Clone, Copy)]
-pub(super) struct Found {
-    /// Density with which its direction was drawn at its origin.
-    pub(super) pdf: f32,
-    /// No emitter sample competes with it.
-    pub(super) delta: bool,
-}
-
 /// One sample of the integral of incident radiance at the first vertex of a path.
 fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     if params.max_depth == 0 {
@@ -315,23 +307,6 @@ pub(super) fn survival(throughput: Rgb, eta: f32) -> f32 {
     (throughput.max_element() * eta * eta * ROULETTE_MERCY).min(ROULETTE_CAP)
 }
 
-/// Radiance that a ray in direction `d` meets where it leaves the scene, and its weight against emitter sampling.
-pub(super) fn environment_met(world: &World, d: Vec3, found: Found) -> (Rgb, f32) {
-    let light = world.lights.environment(d);
-    if light == Rgb::ZERO {
-        return (light, 0.0);
-    }
-    let other = if found.delta { 0.0 } else { world.lights.pdf_environment(d) };
-    (light, power_heuristic(found.pdf, other))
-}
-
-/// Radiance that an emitting surface sends along a ray, to `wo`, and its weight against emitter sampling for `from`.
-pub(super) fn emission_met(world: &World, surface: &Surface, wo: Vec3, from: &Receiver, found: Found) -> (Rgb, f32) {
-    let light = world.lights.emitted(&world.scene, surface, wo);
-    let other = if found.delta { 0.0 } else { world.lights.pdf_surface(&world.scene, from, surface) };
-    (light, power_heuristic(found.pdf, other))
-}
-
 impl Vertex<'_> {
     fn bsdf(&self) -> &Bsdf {
         &self.world.scene.materials[self.surface.material as usize].bsdf
@@ -391,10 +366,4 @@ impl Vertex<'_> {
             }
         }
     }
-}
-
-/// Weight of a sample of density `a` where another technique would have found it with density `b`.
-fn power_heuristic(a: f32, b: f32) -> f32 {
-    let ratio = b / a;
-    1.0 / (1.0 + ratio * ratio)
 }

@@ -6,7 +6,8 @@ use crate::base::ray::Ray;
 use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::transport::light_tree::Receiver;
-use crate::transport::path::{Found, Measure, PathParams, Vertex, emission_met, environment_met, keep_finite, survival};
+use crate::transport::met::{Found, emission_met, environment_met};
+use crate::transport::path::{Measure, PathParams, Vertex, keep_finite, survival};
 use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
 
