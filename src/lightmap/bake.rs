@@ -6,11 +6,12 @@
 //! of the second read diffuse light from its map, one bounce away, where the mean over many texels hides their noise.
 
 use super::denoise::DenoiseParams;
-use super::parts::Store;
+use super::finish::Side;
+use super::parts::{Record, Store};
 use super::solid::{Orientation, solids};
 use super::texels::Texels;
 use super::visible::{Visibility, facing};
-use super::{Atlas, AtlasParams, LightMap, fill, lookup, seam};
+use super::{Atlas, AtlasParams, LightMap, lookup};
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{Parameters, within};
 use crate::base::progress::Progress;
@@ -22,7 +23,6 @@ use crate::transport::World;
 use crate::transport::follow::{Follow, OnCpu, Purpose};
 use crate::transport::path::{KnownDiffuse, PathParams};
 use crate::{Error, Result};
-use glam::Vec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ pub const BLOCK: usize = 4096;
 /// Blocks that a GPU bakes at once.
 const GPU_BLOCKS: usize = 16;
 
-/// Samples that decide what a texel sees, and whether a back is lit at all.
+/// Samples that decide what a texel sees, whether a back is lit at all, and how many more a texel takes.
 pub(super) const FIRST_SAMPLES: u32 = 16;
 
 /// Texels of a chart's back that are asked whether it is lit. All of most charts; of a large wall so many that a lit patch
@@ -52,8 +52,11 @@ pub(super) const PART: u32 = 8;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightMapParams {
-    /// Samples a texel. *Paper* (§7.2): 2048. *Ours*: 256.
+    /// Samples a texel; the most, where `error` is given. *Paper* (§7.2): 2048. *Ours*: 256.
     pub spp: u32,
+    /// Standard error at which a texel is done, in units of its luminance plus [`DIM`](super::adaptive::DIM); `None` gives each `spp` samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<f32>,
     /// Texel size.
     pub atlas: AtlasParams,
     /// Path length and roulette.
@@ -71,7 +74,8 @@ pub struct LightMapParams {
 
 impl Default for LightMapParams {
     fn default() -> Self {
-        Self { spp: 256, atlas: AtlasParams::default(), path: PathParams::default(), first_spp: 0, denoise: None, ao: None }
+        let (atlas, path) = Default::default();
+        Self { spp: 256, error: None, atlas, path, first_spp: 0, denoise: None, ao: None }
     }
 }
 
@@ -84,6 +88,7 @@ impl LightMapParams {
                 return Err(Error::Request("--first-spp: --ao has no use for it: its rays have one segment".into()));
             }
         }
+        self.error.map_or(Ok(()), |e| within("--error", e, f32::MIN_POSITIVE..=1e9))?;
         match (self.spp, &self.denoise) {
             (0, _) => Err(Error::Request("--spp 0: expected at least 1".into())),
             (1, Some(_)) => Err(Error::Request("--denoise: one sample tells nothing of its noise; give --spp 2 or more".into())),
@@ -111,7 +116,7 @@ pub struct Plan<'a> {
     pub(super) texels: Texels,
     orientation: Orientation,
     /// Charts with a front and a back to bake.
-    active: Vec<[bool; 2]>,
+    pub(super) active: Vec<[bool; 2]>,
     /// Texel and whether its back is meant.
     pub(super) items: Vec<(u32, bool)>,
 }
@@ -119,15 +124,31 @@ pub struct Plan<'a> {
 /// One pass over all texels.
 #[derive(Clone, Copy)]
 pub struct Pass<'a> {
-    /// Samples a texel.
+    /// Samples a texel; the most, where there is an error to reach.
     pub(super) spp: u32,
+    pub(super) error: Option<f32>,
     pub(super) seed: u32,
-    /// Where paths read diffuse light.
-    pub(super) known: Option<&'a LightMap>,
+    /// Where paths read diffuse light, and what is known of the texels.
+    pub(super) known: Option<&'a First>,
     /// Where they are followed; `None` for the CPU.
     device: Option<&'a dyn Follow>,
     /// How the noise is taken out of the finished texels, if it is.
     denoise: Option<DenoiseParams>,
+}
+
+/// What a first pass has found.
+pub struct First {
+    /// Its map, from which paths of the second read diffuse light.
+    pub map: LightMap,
+    /// Of each pixel's front and back.
+    flags: Vec<[u32; 2]>,
+}
+
+impl First {
+    /// The flags of a pixel's side.
+    pub(super) fn flags(&self, pixel: u32, back: bool) -> u32 {
+        self.flags[pixel as usize][usize::from(back)]
+    }
 }
 
 impl<'a> Pass<'a> {
@@ -167,12 +188,14 @@ impl<'a> Plan<'a> {
     /// The pass that traces a few paths in full, for the second to read its map; `None` if the second shall do without.
     pub fn first_pass(&self) -> Option<Pass<'static>> {
         let spp = self.params.first_spp;
-        (spp > 0).then(|| Pass { spp, seed: hash_words(&[self.seed, spp]), known: None, device: None, denoise: None })
+        let seed = hash_words(&[self.seed, spp]);
+        (spp > 0).then(|| Pass { spp, error: None, seed, denoise: None, ..self.second_pass(None) })
     }
 
-    /// The pass whose map counts; its paths read diffuse light from `known` and are traced in full without it.
-    pub fn second_pass<'k>(&self, known: Option<&'k LightMap>) -> Pass<'k> {
-        Pass { spp: self.params.spp, seed: self.seed, known, device: None, denoise: self.params.denoise }
+    /// The pass whose map counts; its paths read diffuse light from the `known` map and are traced in full without one.
+    pub fn second_pass<'k>(&self, known: Option<&'k First>) -> Pass<'k> {
+        let LightMapParams { spp, error, denoise, .. } = self.params;
+        Pass { spp, error, seed: self.seed, known, device: None, denoise }
     }
 
     /// Whether it bakes light, and not ambient occlusion.
@@ -220,7 +243,7 @@ impl<'a> Plan<'a> {
 
     fn bake_blocks(&self, pass: &Pass, store: &dyn Store, todo: &[usize], progress: &dyn Progress) -> Result<()> {
         progress.start("Light map", todo.iter().map(|&b| self.block(b as u32).len() as u64).sum());
-        let known = pass.known.map(|map| |s: &Surface, wo| map.diffuse_radiance(&self.world.scene, s, wo));
+        let known = pass.known.map(|first| |s: &Surface, wo| first.map.diffuse_radiance(&self.world.scene, s, wo));
         let known = known.as_ref().map(|known| known as KnownDiffuse);
         let purpose = self.params.ao.map_or(Purpose::Irradiance, Purpose::Openness);
         let on_cpu = OnCpu { world: self.world, purpose, known, params: self.params.path };
@@ -248,13 +271,24 @@ impl<'a> Plan<'a> {
         Ok(lookup::sides(&self.world.scene.geometry, &self.atlas, front, back))
     }
 
+    /// A finished first pass.
+    pub fn first(&self, pass: &Pass, store: &dyn Store, progress: &dyn Progress) -> Result<First> {
+        let mut flags = vec![[0; 2]; (self.atlas.size[0] * self.atlas.size[1]) as usize];
+        for (&(texel, back), record) in self.items.iter().zip(self.records(store)?) {
+            flags[self.texels.pixel[texel as usize] as usize][usize::from(back)] = record[3];
+        }
+        Ok(First { map: self.map(pass, store, progress)?, flags })
+    }
+
+    /// Samples that count, of a texel side on average, once all blocks are there.
+    pub fn mean_samples(&self, store: &dyn Store) -> Result<f64> {
+        let records = self.records(store)?;
+        Ok(records.iter().map(|r| f64::from(r[6])).sum::<f64>() / records.len().max(1) as f64)
+    }
+
     /// Puts a pass's blocks together: noise, where it shall go; gutters, texels that nobody sees, seams.
     pub fn assemble(&self, pass: &Pass, store: &dyn Store, progress: &dyn Progress) -> Result<Baked> {
-        let mut records = Vec::with_capacity(self.items.len());
-        for b in 0..self.blocks() {
-            let block = store.get(b, self.block(b).len());
-            records.extend(block.ok_or_else(|| Error::Request(format!("block {b} of the light map is missing: bake it again")))?);
-        }
+        let mut records = self.records(store)?;
         if let Some(params) = &pass.denoise {
             self.denoise(pass, &mut records, params, progress);
         }
@@ -270,52 +304,13 @@ impl<'a> Plan<'a> {
         Ok(Baked { front: self.finish(front, false), back: has_back.then(|| self.finish(back, true)) })
     }
 
-    fn finish(&self, mut side: Side, back: bool) -> Vec<Rgb> {
-        self.lighten_hidden(&mut side, back);
-        let valid: Vec<bool> = side.flags.iter().map(|f| f & (OPEN | CONTACT) != 0).collect();
-        fill::dilate(&self.atlas, &mut side.pixels, &valid);
-        let active = |chart: u32| self.active[chart as usize][back as usize];
-        seam::close(&self.world.scene.geometry, &self.atlas, &mut side.pixels, &valid, &active);
-        side.pixels
-    }
-
-    /// Texels in the dark behind a wall, and texels pressed against something, take the light of their neighbours in the
-    /// open, so that interpolation up to a wall or a foot does not reach into the dark. Those further in keep their own:
-    /// they may be seen through a crack.
-    fn lighten_hidden(&self, side: &mut Side, back: bool) {
-        let width = self.atlas.size[0] as i64;
-        let mut texel_at = vec![u32::MAX; side.pixels.len()];
-        for (i, &pixel) in self.texels.pixel.iter().enumerate() {
-            texel_at[pixel as usize] = i as u32;
+    fn records(&self, store: &dyn Store) -> Result<Vec<Record>> {
+        let mut records = Vec::with_capacity(self.items.len());
+        for b in 0..self.blocks() {
+            let block = store.get(b, self.block(b).len());
+            records.extend(block.ok_or_else(|| Error::Request(format!("block {b} of the light map is missing: bake it again")))?);
         }
-        let visibility = self.visibility();
-        let centre = |texel: usize| visibility.sample(texel, Vec2::splat(0.5));
-        let changes: Vec<(usize, Rgb)> = (0..self.texels.len())
-            .into_par_iter()
-            .filter_map(|i| {
-                let pixel = self.texels.pixel[i] as usize;
-                let pressed = side.flags[pixel] & CONTACT != 0;
-                let void = side.flags[pixel] & OPEN != 0 && side.pixels[pixel] == Rgb::ZERO;
-                if !pressed && !void {
-                    return None;
-                }
-                let in_the_open = |&p: &usize| {
-                    let chart = |t: u32| self.texels.chart[t as usize];
-                    side.flags.get(p).is_some_and(|f| f & OPEN != 0)
-                        && chart(texel_at[p]) == self.texels.chart[i]
-                        && (pressed
-                            || side.pixels[p] != Rgb::ZERO
-                                && (side.flags[p] & SPLIT != 0
-                                    || !visibility.together(&centre(i), &centre(texel_at[p] as usize), back)))
-                };
-                let around = [-width - 1, -width, 1 - width, -1, 1, width - 1, width, width + 1];
-                let lit: Vec<usize> = around.into_iter().map(|d| (pixel as i64 + d) as usize).filter(in_the_open).collect();
-                (!lit.is_empty()).then(|| (pixel, lit.iter().map(|&p| side.pixels[p]).sum::<Rgb>() / lit.len() as f32))
-            })
-            .collect();
-        for (pixel, value) in changes {
-            side.pixels[pixel] = value;
-        }
+        Ok(records)
     }
 
     pub(super) fn visibility(&self) -> Visibility<'_> {
@@ -356,19 +351,6 @@ impl<'a> Plan<'a> {
                 [seen(false), two_sided && seen(true) && (any_light || lit())]
             })
             .collect()
-    }
-}
-
-/// One side of the atlas in the making.
-struct Side {
-    pixels: Vec<Rgb>,
-    flags: Vec<u32>,
-}
-
-impl Side {
-    fn new(plan: &Plan) -> Self {
-        let n = (plan.atlas.size[0] * plan.atlas.size[1]) as usize;
-        Self { pixels: vec![Rgb::ZERO; n], flags: vec![0; n] }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The bake against closed forms, and the three ways in which light maps leak.
 
+use super::adaptive::DIM;
 use super::bake::{LightMapParams, Pass, Plan};
 use super::parts::{Memory, Store};
 use super::{AtlasParams, DenoiseParams, LightMap, testing};
@@ -39,13 +40,14 @@ fn params(texel: f32, spp: u32) -> LightMapParams {
 
 fn bake(world: &World, params: &LightMapParams) -> LightMap {
     let plan = Plan::new(world, params, 1).unwrap();
-    let map = |pass: &Pass| {
+    let run = |pass: &Pass| {
         let store = Memory::default();
         plan.run(pass, &store, None, &Silent, || Ok(())).unwrap();
-        plan.map(pass, &store, &Silent).unwrap()
+        store
     };
-    let first = plan.first_pass().map(|pass| map(&pass));
-    map(&plan.second_pass(first.as_ref()))
+    let first = plan.first_pass().map(|pass| plan.first(&pass, &run(&pass), &Silent).unwrap());
+    let pass = plan.second_pass(first.as_ref());
+    plan.map(&pass, &run(&pass), &Silent).unwrap()
 }
 
 /// What the map says at the surface below (or above) `p`.
@@ -146,6 +148,41 @@ fn texels_under_a_rectangle_light_hold_its_form_factor() {
     // The mean over a texel is not the value at its centre: curvature of E adds some 0.1 %.
     assert!(mean.abs() < 3e-3, "mean relative error {mean}");
     assert!(worst < 0.03, "worst relative error {worst}");
+}
+
+#[test]
+fn texels_take_the_samples_that_their_error_asks_for() {
+    // A wide lamp that stands on the floor's border: much noise before it, little in the distance.
+    let mut g = Geometry::default();
+    testing::quad(&mut g, Vec3::ZERO, Vec3::Z * 2.0, Vec3::X * 2.0);
+    testing::quad(&mut g, Vec3::new(-0.01, 0.02, 0.0), Vec3::Y, Vec3::Z * 2.0);
+    g.objects[1].emitter = Some(0);
+    let light = Emitter::Area { object: 1, radiance: Texture::Constant(Rgb::splat(3.0)) };
+    let world = World::new(scene(g, diffuse(0.0), vec![light]));
+    let bake = |error: Option<f32>, spp| {
+        let params = LightMapParams { error, ..params(0.1, spp) };
+        let (plan, store) = (Plan::new(&world, &params, 1).unwrap(), Memory::default());
+        let pass = plan.second_pass(None);
+        plan.run(&pass, &store, None, &Silent, || Ok(())).unwrap();
+        (plan.map(&pass, &store, &Silent).unwrap(), plan.mean_samples(&store).unwrap())
+    };
+    let (reference, _) = bake(None, 8192);
+    // Root mean square, over texels, of what is off beside what is allowed.
+    let off = |map: &LightMap| {
+        let at = |i: usize| Vec3::new(0.05 + 0.1 * (i % 20) as f32, 0.1, 0.05 + 0.1 * (i / 20) as f32);
+        let both = (0..400).map(|i| [map, &reference].map(|map| map_at(&world, map, at(i), Vec3::NEG_Y, false)));
+        (both.map(|[x, r]| ((x - r) / (r + DIM)).powi(2)).sum::<f32>() / 400.0).sqrt()
+    };
+    let (map, coarse) = bake(Some(0.04), 4096);
+    assert!(off(&map) < 0.04, "{}", off(&map));
+    let (map, fine) = bake(Some(0.02), 4096);
+    assert!(off(&map) < 0.02, "{}", off(&map));
+    assert!(
+        (3.0..4.05).contains(&(fine / coarse)),
+        "{coarse} and {fine} samples: an error of a half asks for four times as many"
+    );
+    let (_, few) = bake(Some(0.02), 32);
+    assert!((16.0..=32.0).contains(&few), "{few} samples of at most 32");
 }
 
 /// A floor of one chart with a black box on it, whose sides cross texels at 0.3 of their width.
@@ -278,8 +315,8 @@ fn a_scene_without_surfaces_or_light_gives_an_empty_or_black_map() {
 #[test]
 fn shards_and_threads_and_taking_up_a_killed_bake_change_no_bit() {
     let world = box_on_floor(0.0);
-    for denoise in [None, Some(DenoiseParams::default())] {
-        let params = LightMapParams { denoise, ..params(0.02, 2) };
+    for (spp, error, denoise) in [(2, None, None), (2, None, Some(DenoiseParams::default())), (64, Some(0.05), None)] {
+        let params = LightMapParams { error, denoise, ..params(0.02, spp) };
         let plan = Plan::new(&world, &params, 7).unwrap();
         assert!(plan.blocks() >= 3, "{} blocks", plan.blocks());
         let assemble = |plan: &Plan, store: &Memory| plan.assemble(&plan.second_pass(None), store, &Silent);

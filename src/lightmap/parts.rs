@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// Words of a finished texel.
-pub const WORDS: usize = 6;
+pub const WORDS: usize = 7;
 
-/// A finished texel: three radiometric values, flags, the variance of the values' luminance, and the number of a sample that counts, all as bits.
+/// A finished texel: three radiometric values, flags, the variance of the values' luminance, the number of a sample that counts, and how many
+/// do, all as bits.
 pub type Record = [u32; WORDS];
 
 /// Keeps finished blocks.
@@ -107,7 +108,7 @@ mod tests {
     fn only_whole_blocks_of_the_same_bake_come_back() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("lightmap.exr.parts");
-        let records = vec![[1, 2, 3, 4, 5, 6], [7, 8, 9, u32::MAX, 10, 11]];
+        let records = vec![[1, 2, 3, 4, 5, 6, 7], [8, 9, 10, u32::MAX, 11, 12, 13]];
         let store = Folder::new(&path, "a bake");
         store.put(3, &records).unwrap();
         assert_eq!(store.get(3, 2), Some(records));

@@ -22,7 +22,7 @@ impl Plan<'_> {
         let sites = self.sites(pass, records);
         let links = self.links(&sites);
         let light = |s: &Site| {
-            let [r, g, b, _, variance, _] = records[s.item as usize].map(f32::from_bits);
+            let [r, g, b, _, variance, ..] = records[s.item as usize].map(f32::from_bits);
             Light { color: Rgb::new(r, g, b), variance }
         };
         let light: Vec<Light> = sites.iter().map(light).collect();

@@ -11,6 +11,9 @@ use rayon::prelude::*;
 /// Smallest covered part of a texel that counts.
 const MIN_AREA: f32 = 1e-5;
 
+/// Part of a texel from which on it counts as covered by one triangle.
+const WHOLE: f32 = 1.0 - 1e-5;
+
 /// The covered texels of an atlas, chart by chart, each with the triangles that cover it.
 #[derive(Debug, Clone, Default)]
 pub struct Texels {
@@ -99,8 +102,10 @@ impl Texels {
         let corners = geometry.corners(triangle).map(|p| chart.project(p));
         let width = atlas.size[0];
         let corner = Vec2::new((self.pixel[texel] % width) as f32, (self.pixel[texel] / width) as f32);
-        let polygon = Polygon::clip(corners.map(|c| c - corner));
-        let p = polygon.point(Vec2::new((x / area).clamp(0.0, 1.0), u.y)) + corner;
+        let v = Vec2::new((x / area).clamp(0.0, 1.0), u.y);
+        // Most texels lie within one triangle, which need not be cut.
+        let within = if area < WHOLE { Polygon::clip(corners.map(|c| c - corner)).point(v) } else { v };
+        let p = within + corner;
         Point { triangle, barycentric: barycentric(&corners, p) }
     }
 }

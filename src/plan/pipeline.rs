@@ -96,6 +96,7 @@ impl Pipeline {
             BakeLightmap {
                 scene: scene(),
                 spp: Some(s.lightmap_spp),
+                error: s.lightmap_error.filter(|_| !s.paper),
                 first_spp: Some(if s.paper { 0 } else { s.lightmap_first_spp }),
                 // One path tells nothing of its noise.
                 denoise: s.lightmap_denoise && !s.paper && s.lightmap_spp > 1,
@@ -110,6 +111,7 @@ impl Pipeline {
                 probes: bakes.grid.clone(),
                 qhmap: bakes.qhmap.clone(),
                 spp: Some(s.spp),
+                error: s.error.filter(|_| !s.paper),
                 paper: s.paper,
                 lightmap: (!s.paper).then(|| bakes.lightmap.clone()),
                 for_path: self.path.clone().filter(|_| for_path),

@@ -20,10 +20,14 @@ pub struct Settings {
     pub probes: u32,
     /// Size of a probe, texels.
     pub probe_size: Size,
-    /// Paths a probe's texel.
+    /// Paths a probe's texel; the most, where it has an error to reach.
     pub spp: u32,
-    /// Paths a light map's texel.
+    /// Standard error at which a probe's texel is done.
+    pub error: Option<f32>,
+    /// Paths a light map's texel; the most, where it has an error to reach.
     pub lightmap_spp: u32,
+    /// Standard error at which a light map's texel is done.
+    pub lightmap_error: Option<f32>,
     /// Paths a light map's texel in a first pass; 0 for none.
     pub lightmap_first_spp: u32,
     /// Whether the noise is taken out of the light map.
@@ -52,7 +56,9 @@ impl Preset {
                 probes: 12,
                 probe_size: Size([256, 128]),
                 spp: 64,
+                error: Some(0.1),
                 lightmap_spp: 64,
+                lightmap_error: Some(0.2),
                 lightmap_first_spp: 8,
                 lightmap_denoise: true,
                 lightmap_texels: 150_000,
@@ -68,7 +74,6 @@ impl Preset {
                 probe_size: Size([512, 256]),
                 spp: 128,
                 lightmap_spp: 128,
-                lightmap_first_spp: 16,
                 lightmap_texels: 1_000_000,
                 size: Some(Size([480, 270])),
                 reference_spp: 256,
@@ -78,7 +83,9 @@ impl Preset {
                 probes: 252,
                 probe_size: Size([1024, 512]),
                 spp: 2048,
+                error: None,
                 lightmap_spp: 2048,
+                lightmap_error: None,
                 lightmap_first_spp: 0,
                 lightmap_denoise: false,
                 lightmap_texels: 4_000_000,

@@ -27,14 +27,18 @@ pub fn lightmap(world: &World, params: &LightParams, gpu: Option<(&GpuScene, &Pa
     let run = |pass: &reprobe::lightmap::bake::Pass| {
         let store = Memory::default();
         plan.run(pass, &store, None, &Silent, || Ok(())).unwrap();
-        plan.map(pass, &store, &Silent).unwrap()
+        store
     };
-    let first = plan.first_pass().map(|pass| run(&pass.on(gpu.map(|(_, paths)| paths as &dyn Follow))));
+    let first = plan.first_pass().map(|pass| {
+        let pass = pass.on(gpu.map(|(_, paths)| paths as &dyn Follow));
+        plan.first(&pass, &run(&pass), &Silent).unwrap()
+    });
     let second = gpu
         .zip(first.as_ref())
-        .map(|((scene, _), map)| Paths::irradiance(Arc::new(scene.with_lightmap(map).unwrap()), &params.path).unwrap());
+        .map(|((scene, _), first)| Paths::irradiance(Arc::new(scene.with_lightmap(&first.map).unwrap()), &params.path).unwrap());
     let gpu = second.as_ref().or(gpu.map(|(_, paths)| paths));
-    run(&plan.second_pass(first.as_ref()).on(gpu.map(|paths| paths as &dyn Follow)))
+    let pass = plan.second_pass(first.as_ref()).on(gpu.map(|paths| paths as &dyn Follow));
+    plan.map(&pass, &run(&pass), &Silent).unwrap()
 }
 
 pub fn light_maps_are_the_cpus(device: &Device) {

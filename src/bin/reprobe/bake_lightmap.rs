@@ -15,6 +15,7 @@ use std::path::PathBuf;
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 512 --shard 0/4
   reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 16 --denoise
+  reprobe bake-lightmap room/scene.xml -o lightmap.exr --spp 256 --error 0.1 --first-spp 8 --denoise
   reprobe bake-lightmap room/scene.xml -o ao.exr --ao=0.5 --spp 64")]
 pub struct Args {
     /// Scene: Mitsuba XML or JSON, or glTF
@@ -23,9 +24,13 @@ pub struct Args {
     /// The light map to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Samples a texel
+    /// Samples a texel; the most, where --error is given
     #[arg(long, value_name = "N", default_value_t = LightMapParams::default().spp, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: u32,
+    /// Give each texel as many samples as bring its standard error down to E of its light, by what its first 16 and those around them tell; of
+    /// dim light, below that of a white wall of radiance 0.01, less is asked
+    #[arg(long, value_name = "E")]
+    error: Option<f32>,
     /// Edge of a texel, metres, in place of --texels
     #[arg(long, value_name = "M")]
     texel: Option<f32>,
@@ -50,7 +55,7 @@ pub struct Args {
 impl Args {
     /// What the arguments come to.
     pub fn stage(self) -> BakeLightmap {
-        let Self { scene, output, spp, texel, texels, first_spp, denoise, ao, shard } = self;
-        BakeLightmap { scene, output, spp: Some(spp), texel, texels, first_spp: Some(first_spp), denoise, ao, shard }
+        let Self { scene, output, spp, error, texel, texels, first_spp, denoise, ao, shard } = self;
+        BakeLightmap { scene, output, spp: Some(spp), error, texel, texels, first_spp: Some(first_spp), denoise, ao, shard }
     }
 }

@@ -47,10 +47,10 @@ pub struct Args {
     /// Size of a probe, texels
     #[arg(long, value_name = "WxH")]
     probe_size: Option<Size>,
-    /// Paths a probe texel
+    /// Paths a probe texel, of every one; without it, as many as its noise asks for
     #[arg(long, value_name = "N")]
     spp: Option<u32>,
-    /// Paths a light map texel
+    /// Paths a light map texel, of every one; without it, as many as its noise asks for
     #[arg(long, value_name = "N")]
     lightmap_spp: Option<u32>,
     /// Size of a light map texel, metres
@@ -106,7 +106,9 @@ fn settings(args: &Args) -> Settings {
         probes: args.probes.unwrap_or(preset.probes),
         probe_size: args.probe_size.unwrap_or(preset.probe_size),
         spp: args.spp.unwrap_or(preset.spp),
+        error: preset.error.filter(|_| args.spp.is_none()),
         lightmap_spp: args.lightmap_spp.unwrap_or(preset.lightmap_spp),
+        lightmap_error: preset.lightmap_error.filter(|_| args.lightmap_spp.is_none()),
         texel: args.texel,
         size: args.size.or(preset.size),
         supersample: args.supersample.unwrap_or(preset.supersample),

@@ -6,7 +6,7 @@ use crate::gpu::{GpuScene, Paths};
 use crate::io::Provenance;
 use crate::io::jobs::{Done, Shard, is_finished, touch};
 use crate::lightmap::parts::Folder;
-use crate::lightmap::{AtlasParams, DenoiseParams, LightMap, LightMapParams, Plan, lookup};
+use crate::lightmap::{AtlasParams, DenoiseParams, First, LightMapParams, Plan, lookup};
 use crate::plan::option::stage;
 use crate::plan::{Context, Outcome};
 use crate::transport::World;
@@ -27,8 +27,10 @@ stage! {
         scene,
     }
     {
-        /// Samples a texel.
+        /// Samples a texel; the most, where an error is given.
         "--spp" spp: Option<u32>,
+        /// Standard error of a texel at which it is done.
+        "--error" error: Option<f32>,
         /// Samples a texel of a first pass, from whose map the paths of the second read diffuse light.
         "--first-spp" first_spp: Option<u32>,
         /// About how many texels the surfaces get in all.
@@ -58,6 +60,7 @@ impl BakeLightmap {
         let atlas = AtlasParams { texel: self.texel, budget: self.texels.unwrap_or(base.atlas.budget) };
         let params = LightMapParams {
             spp: self.spp.unwrap_or(base.spp),
+            error: self.error,
             first_spp: self.first_spp.unwrap_or(base.first_spp),
             atlas,
             denoise: self.denoise.then(DenoiseParams::default),
@@ -118,13 +121,15 @@ impl BakeLightmap {
         let scene = if params.ao.is_none() { cx.on_gpu(|gpu| GpuScene::new(gpu, world))? } else { None };
         let first = self.first_pass(cx, &plan, params, first_store, scene.as_ref())?;
         let scene = match (scene, &first) {
-            (Some(scene), Some(map)) => Some(scene.with_lightmap(map)?),
+            (Some(scene), Some(first)) => Some(scene.with_lightmap(&first.map)?),
             (scene, _) => scene,
         };
         let device = on_gpu(scene, params)?;
         let device = device.as_ref().map(|d| d as &dyn Follow);
         let pass = plan.second_pass(first.as_ref()).on(device);
+        let mut samples = f64::from(params.spp);
         let done = plan.run(&pass, store, self.shard, cx.progress(), || {
+            samples = plan.mean_samples(store)?;
             let baked = plan.assemble(&pass, store, cx.progress())?;
             let encode = if plan.is_light() { lookup::encode } else { lookup::encode_openness };
             let image = encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone());
@@ -132,10 +137,10 @@ impl BakeLightmap {
             store.remove()?;
             first_store.remove()
         })?;
-        Ok(self.outcome(&plan, params, done, device.map_or("cpu", Follow::device), [loaded, planned, clock()]))
+        Ok(self.outcome(&plan, (params, samples), done, device.map_or("cpu", Follow::device), [loaded, planned, clock()]))
     }
 
-    /// The map of the first pass, where there is one; every shard needs all of it.
+    /// What the first pass has found, where there is one; every shard needs all of it.
     fn first_pass(
         &self,
         cx: &Context,
@@ -143,15 +148,22 @@ impl BakeLightmap {
         params: &LightMapParams,
         store: &Folder,
         scene: Option<&GpuScene>,
-    ) -> Result<Option<LightMap>> {
+    ) -> Result<Option<First>> {
         let Some(pass) = plan.first_pass() else { return Ok(None) };
         let device = on_gpu(scene.cloned(), params)?;
         let pass = pass.on(device.as_ref().map(|d| d as &dyn Follow));
         plan.run(&pass, store, None, cx.progress(), || Ok(()))?;
-        plan.map(&pass, store, cx.progress()).map(Some)
+        plan.first(&pass, store, cx.progress()).map(Some)
     }
 
-    fn outcome(&self, plan: &Plan, params: &LightMapParams, done: Done, device: &str, times: [f64; 3]) -> Outcome {
+    fn outcome(
+        &self,
+        plan: &Plan,
+        (params, samples): (&LightMapParams, f64),
+        done: Done,
+        device: &str,
+        times: [f64; 3],
+    ) -> Outcome {
         let atlas = &plan.atlas;
         let ([width, height], Done { kept, missing, .. }, [loaded, planned, seconds]) = (atlas.size, done, times);
         let state = done.rest(" blocks");
@@ -159,18 +171,17 @@ impl BakeLightmap {
         let denoised = if self.denoise && missing == 0 { ", denoised" } else { "" };
         Outcome {
             summary: format!(
-                "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {} samples{what}{denoised}, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
+                "{}: {width} x {height}, {} charts, texels of {} m, {} of them baked ({} behind) at {samples:.0} samples{what}{denoised}, {kept} of {} blocks kept from before, {seconds:.1} s on {device}{state}",
                 self.output.display(),
                 atlas.charts.len(),
                 atlas.texel,
                 plan.len(),
                 plan.backs(),
-                params.spp,
                 plan.blocks(),
             ),
             figures: json!({
                 "size": atlas.size, "charts": atlas.charts.len(), "texel": atlas.texel, "texels": plan.len(), "backs": plan.backs(),
-                "spp": params.spp, "ao": params.ao, "denoise": self.denoise, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
+                "spp": params.spp, "error": params.error, "samples": samples, "ao": params.ao, "denoise": self.denoise, "blocks": plan.blocks(), "blocks_kept": kept, "blocks_missing": missing,
                 "device": device, "seconds_load": loaded, "seconds_plan": planned, "seconds": seconds,
             }),
             ..Outcome::default()
