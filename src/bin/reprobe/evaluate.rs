@@ -1,10 +1,12 @@
 //! `reprobe evaluate`: methods and ablations against one reference.
 
 use crate::preset::Preset;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use reprobe::method::METHODS;
 use reprobe::plan::evaluation::{Evaluate, all_variants};
 use reprobe::plan::option::Size;
 use reprobe::plan::settings::Settings;
-use reprobe::plan::variant::{Given, Variant, parse_bake};
+use reprobe::plan::variant::{ALL, Given, Named, Variant, chosen, parse_bake};
 use reprobe::plan::views::FrameList;
 use reprobe::plan::{Context, Outcome};
 use serde_json::json;
@@ -25,6 +27,8 @@ pub enum Ablations {
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,path-trace
+  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods all --reference-spp 256
+  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,glossy-probes-rays,path-trace-oidn --reference mitsuba/
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --ablations paper --preset medium --reference mitsuba/
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --probes probes/ --lightmap lightmap.exr \\
       --variant one=glossy-probes,gather.probes=1 --variant fast=path-trace,--spp=4
@@ -40,9 +44,9 @@ pub struct Args {
     /// Folder for the report, frames and bakes
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Methods of render-path [default: glossy-probes, where there is no --variant]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Variant::plain)]
-    methods: Vec<Variant>,
+    /// Methods of render-path, and variants of them that are known by name [default: glossy-probes, where there is no --variant]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named())]
+    methods: Vec<Named>,
     /// A method with options of render-path (--spp=4), parameters of its passes (gather.probes=1), or bakes of its own
     /// (bake-probes:--spp=64); may be repeated
     #[arg(long = "variant", value_name = "NAME=METHOD,...", value_parser = Variant::parse)]
@@ -100,6 +104,16 @@ pub struct Args {
     dry_run: bool,
 }
 
+/// The table's methods, each before its variants.
+fn named() -> impl TypedValueParser<Value = Named> {
+    let all = PossibleValue::new(ALL).help("all of these; variants with OIDN where the library is found");
+    let table = METHODS.iter().flat_map(|m| {
+        let variants = m.variants.iter().map(|(name, what)| PossibleValue::new(*name).help(*what));
+        std::iter::once(PossibleValue::new(m.name).help(m.about)).chain(variants)
+    });
+    PossibleValuesParser::new(table.chain([all])).try_map(|name| Named::parse(&name))
+}
+
 impl Args {
     fn settings(&self) -> Settings {
         let preset = reprobe::plan::settings::Preset::from(self.preset).settings(true);
@@ -118,7 +132,8 @@ impl Args {
 
 pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
     let settings = args.settings();
-    let variants = all_variants(&args.methods, &args.variants, args.ablations.is_some(), &args.only, settings.probes)?;
+    let methods = chosen(&args.methods, cx)?;
+    let variants = all_variants(&methods, &args.variants, args.ablations.is_some(), &args.only, settings.probes)?;
     let evaluate = Evaluate {
         scene: args.scene.clone(),
         path: args.path.clone(),
