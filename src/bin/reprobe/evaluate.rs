@@ -27,8 +27,9 @@ pub enum Ablations {
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,path-trace
-  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods all --reference-spp 256
-  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,glossy-probes-rays,path-trace-oidn --reference mitsuba/
+  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods all --reference-pair --reference-spp 256
+  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,glossy-probes-rays,path-trace-oidn \\
+      --reference mitsuba/ --second-reference mitsuba_seed_1/
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --ablations paper --preset medium --reference mitsuba/
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --probes probes/ --lightmap lightmap.exr \\
       --variant one=glossy-probes,gather.probes=1 --variant fast=path-trace,--spp=4
@@ -60,6 +61,13 @@ pub struct Args {
     /// Frames to compare with, NNNN.exr; without it, the path is path-traced
     #[arg(long, value_name = "DIR")]
     reference: Option<PathBuf>,
+    /// Those frames rendered with another seed: RMSE, DSSIM and the change from frame to frame are told without the
+    /// references' own noise, too, and the verdict goes by that
+    #[arg(long, value_name = "DIR", requires = "reference")]
+    second_reference: Option<PathBuf>,
+    /// Path-trace the reference twice, with two seeds, for the same
+    #[arg(long, conflicts_with = "reference")]
+    reference_pair: bool,
     /// Defaults of all stages, as for run
     #[arg(long, value_enum, default_value_t = Preset::Draft)]
     preset: Preset,
@@ -96,7 +104,8 @@ pub struct Args {
     /// Stops by which radiance is brightened for the display metrics and the pictures
     #[arg(long, value_name = "E", default_value_t = 0.0, allow_negative_numbers = true)]
     exposure: f32,
-    /// About how large index.html may be, megabytes; it shows pictures of fewer frames where they would take more
+    /// About how large index.html may be, megabytes; where its pictures would take more they are coarser, then smaller, then of
+    /// fewer frames
     #[arg(long, value_name = "MB", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=1000))]
     page_mb: u32,
     /// Print the stages' commands and stop
@@ -140,6 +149,8 @@ pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
         output: args.output.clone(),
         variants,
         reference: args.reference.clone(),
+        second_reference: args.second_reference.clone(),
+        reference_pair: args.reference_pair,
         probes: args.probes.clone(),
         lightmap: args.lightmap.clone(),
         curvature: args.curvature.clone(),
