@@ -97,10 +97,18 @@ async function keyboard(file) {
   await page.focus("#metric"); await key("+"); check("not in a list", (await state(page)).zoom === 1);
   await page.evaluate(() => document.activeElement.blur());
   const { first: shown } = await state(page);
-  for (const k of ["Space", "r"]) {
-    await page.keyboard.down(k); check(`${k} held shows the reference`, (await state(page)).first !== shown);
-    await page.keyboard.up(k); check(`${k} let go`, (await state(page)).first === shown);
-  }
+  await page.keyboard.down("r"); check("r held shows the reference", (await state(page)).first !== shown);
+  await page.keyboard.up("r"); check("r let go", (await state(page)).first === shown);
+  const pressed = () => page.evaluate(() => $("play").getAttribute("aria-pressed"));
+  const heights = () => page.evaluate(() => JSON.stringify([...document.querySelectorAll(".pane, .bar, #plot")].map(e => e.getBoundingClientRect()).map(r => [r.left, r.top, r.width, r.height])));
+  const still = await heights(), names = new Set();
+  await key("Space"); check("Space plays", await pressed() === "true");
+  for (let i = 0; i < 30; i++) { await wait(50); names.add((await state(page)).name); }
+  check("every frame is played", names.size >= Math.min(4, await page.evaluate(() => 1 + +$("slide").max)), [...names]);
+  check("nothing moves but the pictures", await heights() === still, [still, await heights()]);
+  await key("Space"); check("Space again stops", await pressed() === "false");
+  const { name: stopped } = await state(page); await wait(300);
+  check("and stays", (await state(page)).name === stopped);
   await key("ArrowRight", "+", "+", "+", "Shift+ArrowRight");
   const pane = page.locator(".pane").first();
   await pane.hover({ position: { x: 90, y: 50 } }); await wait(400);

@@ -130,7 +130,10 @@ fn given_bakes_and_a_given_reference_are_used_as_they_are() {
 fn wrong_requests_are_refused_before_anything_is_baked() {
     let f = folder();
     for (args, expected) in [
-        ("--methods magic", "no method \"magic\""),
+        ("--methods magic", "[possible values: glossy-probes, glossy-probes-rays, path-trace,"),
+        ("--methods all,ulr", "ulr: two methods have this name"),
+        ("--methods ulr --second-reference b", "--reference <DIR>"),
+        ("--methods ulr --reference a --reference-pair", "cannot be used with"),
         ("--variant a=glossy-probes --variant a=path-trace", "two methods have this name"),
         ("--variant a=path-trace,--sppp=3", "--sppp"),
         ("--variant a=glossy-probes,bake-probes:--sppp=3", "--sppp"),
@@ -154,6 +157,16 @@ fn wrong_requests_are_refused_before_anything_is_baked() {
     assert!(text.contains("bake-lightmap") && !text.contains("bake-probes") && !text.contains("place-probes"), "{text}");
     let text = dry("--methods glossy-probes,ulr");
     assert!(text.contains("bake-probes") && !text.contains("--for-path"), "ulr wants any texel: {text}");
+    let text = dry("--methods all --reference-pair");
+    for part in [
+        "--set rays.per_pixel=4 --output out/frames/glossy-probes-rays",
+        "--output out/frames/path-trace-filter",
+        "--output out/frames/many-light",
+        "reprobe bake-transport",
+        "--output out/second-reference",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
     assert!(!f.at("out").exists());
 }
 
@@ -166,4 +179,52 @@ fn a_reference_noisier_than_what_it_judges_is_a_warning() {
     assert!(output.status.success(), "{said}");
     assert!(said.contains("four has 4 samples a pixel, its reference 4") && said.contains("--reference-spp some 32"), "{said}");
     assert!(!said.contains("three has"), "{said}");
+}
+
+/// One subcommand's numbers are the other's.
+#[test]
+fn errors_without_the_references_noise_are_those_of_compare() {
+    let f = folder();
+    let small = "--size 24x16 --variant two=path-trace,--spp=2 --variant four=path-trace,--spp=4 --reference-spp 4";
+    let figures = figures(&f, &format!("{small} --reference-pair"));
+    let json = read_json(&f, "out/evaluation.json");
+    for (method, name) in ["two", "four"].into_iter().enumerate() {
+        for layer in ["glossy", "full"] {
+            let references = "out/reference --second-reference out/second-reference";
+            f.success(&format!("compare out/frames/{name} {references} --layer {layer} -o report"));
+            let theirs = read_json(&f, "report/metrics.json");
+            let ours = &json["methods"][method]["layers"][layer];
+            for key in ["rmse_rgb", "rmse_lum", "dssim_rgb", "dssim_lum", "noise_rmse_rgb"] {
+                assert_eq!(ours["mean"]["without_noise"][key], theirs["without_noise"][key], "{name} {layer} {key}");
+                for frame in 0..3 {
+                    let [mine, other] = [&ours["frames"][frame], &theirs["frames"][frame]].map(|f| &f["without_noise"][key]);
+                    assert!(mine.is_number() && mine == other, "{name} {layer} {key} {frame}: {mine} {other}");
+                }
+            }
+            let change = |frame: usize| &ours["frames"][frame]["without_noise"]["change_rms"];
+            assert!(change(0).is_null() && change(1).is_number() && change(2).is_number());
+            assert_eq!(figures["methods"][name][layer]["without_noise"], ours["mean"]["without_noise"]);
+        }
+    }
+    let mean = |key: &str| figures["methods"]["four"]["full"]["without_noise"][key].as_f64().unwrap();
+    let noisy = figures["methods"]["four"]["full"]["rmse_rgb"].as_f64().unwrap();
+    assert!(mean("rmse_rgb") < 0.95 * noisy && mean("noise_rmse_rgb") > 0.0, "{} {noisy}", mean("rmse_rgb"));
+    let tables = std::fs::read_to_string(f.at("out/evaluation.md")).unwrap();
+    for part in ["| clean RMSE RGB |", "Least clean RMSE RGB", "- two: path-trace, --spp=2", "4 samples a pixel, with two seeds"]
+    {
+        assert!(tables.contains(part), "{part}: {tables}");
+    }
+
+    // The same two, given; and what is not a second reference.
+    let given = |second: &str| {
+        format!("--size 24x16 --variant two=path-trace,--spp=2 --reference out/reference --second-reference {second}")
+    };
+    let said = f.success(&format!("evaluate scene.xml --path path.json -o again {}", given("out/second-reference")));
+    assert!(said.contains("clean RMSE") && said.contains("change"), "{said}");
+    assert_eq!(read_json(&f, "again/evaluation.json")["methods"][0], json["methods"][0]);
+    let message = refusal(&f, &given("out/reference"));
+    assert!(message.contains("another seed"), "{message}");
+    std::fs::remove_file(f.at("out/second-reference/0001.exr")).unwrap();
+    let message = refusal(&f, &given("out/second-reference"));
+    assert!(message.contains("second-reference/0001.exr") && message.contains("every frame"), "{message}");
 }

@@ -64,6 +64,8 @@ pub struct Method {
     pub orthographic: bool,
     /// Whether a frame may depend on the one before it: it does where it, on its own, has unserved pixels.
     pub sequential: bool,
+    /// Variants that `evaluate` knows by name and shows beside it: a name, which is its own and more, and what `--variant` takes after it.
+    pub variants: &'static [(&'static str, &'static str)],
     /// Its parameters, checked, from the options.
     pub parameters: fn(&Options) -> Result<Value>,
     /// Fills in what the scene says of them, where the options have left it open; and warnings.
@@ -332,6 +334,8 @@ mod tests {
     fn rows_differ_in_name_and_their_defaults_are_in_range() {
         for (i, row) in METHODS.iter().enumerate() {
             assert!(METHODS[..i].iter().all(|other| other.name != row.name));
+            let of_it = |name: &str| name.strip_prefix(row.name).is_some_and(|rest| rest.starts_with('-'));
+            assert!(row.variants.iter().all(|(name, _)| of_it(name)), "{:?}", row.variants);
             let parameters = (row.parameters)(&Options::default()).unwrap();
             assert_eq!(row.samples.is_some(), row.count(&parameters).is_some(), "{}", row.name);
             if let Some(samples) = &row.samples {

@@ -87,7 +87,8 @@ function link(panes, size, knife, changed, pointed) {
   return { place, zoomTo, move, fit: () => zoomTo(1) };
 }
 
-// The keys of a page. None while something is typed or with Ctrl, the browser's own zoom; Space on a focused button presses it.
+// The keys of a page. None while something is typed or with Ctrl, the browser's own zoom; Space on a focused button presses it, and else
+// plays, where there is something to play.
 function listen(linked, step, peek) {
   const arrows = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   const action = e => {
@@ -99,33 +100,36 @@ function listen(linked, step, peek) {
     if (e.key === "+" || e.key === "=") return () => linked.zoomTo(view.zoom * 1.25);
     if (e.key === "-") return () => linked.zoomTo(view.zoom / 1.25);
     if (e.key === "0") return linked.fit;
-    if (e.key === "p") return () => $("play").click();
-    if (e.key === "r" || (e.key === " " && !on("button"))) return () => { if (!e.repeat) peek(true); };
+    if (e.key === "p" || (e.key === " " && !on("button"))) return $("play").hidden ? undefined : () => { if (!e.repeat) $("play").click(); };
+    if (e.key === "r") return () => { if (!e.repeat) peek(true); };
   };
   addEventListener("keydown", e => { const act = action(e); if (act) { e.preventDefault(); act(); } });
-  addEventListener("keyup", e => { if (e.key === " " || e.key === "r") peek(false); });
+  addEventListener("keyup", e => { if (e.key === "r") peek(false); });
   addEventListener("blur", () => peek(false));
 }
 
-// The walk as a film: `onward()` shows the next frame, and after the last the first, twelve times a second, or as fast as the pictures come.
-function film(count, images, onward) {
-  let playing = false;
-  const play = $("play");
+// The walk as a film: `onward()` shows the next frame, and after the last the first; it may say when all of that is there. The next
+// follows after `period()` milliseconds, or as soon as the pictures have come. `paused` hears of the end.
+function film(count, images, onward, period = () => 1000 / 12, paused = () => {}) {
+  const play = $("play"), reel = { playing: false };
+  let round = 0;
   play.hidden = count < 2;
   const run = async () => {
-    while (playing) {
-      const wait = new Promise(done => setTimeout(done, 1000 / 12));
+    const mine = ++round;
+    while (mine === round) {
+      const due = performance.now() + period();
+      await onward();
       await Promise.all(images.map(image => image.decode().catch(() => {})));
-      await wait;
-      if (playing) onward();
+      await new Promise(done => setTimeout(done, Math.max(0, due - performance.now())));
     }
   };
   play.onclick = () => {
-    playing = !playing;
-    play.setAttribute("aria-pressed", playing);
-    play.textContent = playing ? "pause" : "play";
-    if (playing) run();
+    reel.playing = !reel.playing;
+    play.setAttribute("aria-pressed", reel.playing);
+    play.textContent = reel.playing ? "pause" : "play";
+    if (reel.playing) run(); else { round++; paused(); }
   };
+  return reel;
 }
 
 // The choice in the address, so that a reload or a link shows the same: `chosen()` tells it, `choose` takes it. Browsers refuse

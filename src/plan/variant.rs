@@ -1,10 +1,11 @@
-//! `NAME=METHOD,...`: a method with other parameters, other options or other bakes.
+//! `NAME=METHOD,...`: a method with other parameters, other options or other bakes; those that are known by name.
 
-use super::Stage;
 use super::stage::BAKES;
+use super::{Context, Stage};
 use crate::base::named::split;
-use crate::method::Method;
+use crate::method::{METHODS, Method};
 use crate::metric::evaluation::Ablation;
+use crate::view::oidn::Oidn;
 use crate::{Error, Result};
 
 /// An option of a command, and its value where it has one.
@@ -74,6 +75,11 @@ impl Variant {
         configure(stage, &self.bakes)
     }
 
+    /// Whether it asks for Open Image Denoise, and for nothing in its place.
+    fn needs_oidn(&self) -> bool {
+        self.option("--denoise") == Some("oidn")
+    }
+
     /// What differs from the method's defaults, for people.
     pub fn differences(&self) -> Vec<String> {
         let text = |(name, value): &Given| value.as_ref().map_or(name.clone(), |v| format!("{name}={v}"));
@@ -104,6 +110,65 @@ pub fn parse_bake(text: &str) -> std::result::Result<(String, Given), String> {
         Some((stage, option)) if BAKES.contains(&stage) && option.starts_with("--") => Ok((stage.into(), given(option))),
         _ => Err(format!("\"{text}\": expected STAGE:--OPTION=VALUE, the stage one of {}", BAKES.join(", "))),
     }
+}
+
+/// Stands in `--methods` for every method and its variants.
+pub const ALL: &str = "all";
+
+/// What `--methods` takes.
+#[derive(Clone)]
+pub enum Named {
+    /// [`ALL`].
+    All,
+    /// A method, or a variant of the table of methods.
+    One(Variant),
+}
+
+impl Named {
+    /// By its name.
+    pub fn parse(name: &str) -> std::result::Result<Self, String> {
+        if name == ALL {
+            return Ok(Self::All);
+        }
+        let known = known()?;
+        let found = known.iter().find(|v| v.name == name).cloned();
+        let names = || known.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", ");
+        found.map(Self::One).ok_or_else(|| format!("no method \"{name}\"; there are {ALL}, {}", names()))
+    }
+}
+
+/// All methods, each before its variants.
+fn known() -> std::result::Result<Vec<Variant>, String> {
+    let variants =
+        |m: &'static Method| m.variants.iter().map(move |(name, what)| Variant::parse(&format!("{name}={},{what}", m.name)));
+    METHODS.iter().copied().flat_map(|m| std::iter::once(Variant::plain(m.name)).chain(variants(m))).collect()
+}
+
+/// What `named` comes to, in order; says which of [`ALL`] this machine lacks the denoiser for.
+pub fn chosen(named: &[Named], cx: &Context) -> Result<Vec<Variant>> {
+    let wants_all = named.iter().any(|n| matches!(n, Named::All));
+    let missing = wants_all.then(|| Oidn::found().err()).flatten();
+    let (variants, left_out) = expand(named, missing.is_none()).map_err(Error::Request)?;
+    if let Some(why) = missing.filter(|_| !left_out.is_empty()) {
+        cx.listener.warn(&format!("{ALL} leaves out {}: {why}", left_out.join(", ")));
+    }
+    Ok(variants)
+}
+
+/// What `named` comes to, and the names that [`ALL`] leaves out where there is no Open Image Denoise.
+fn expand(named: &[Named], has_oidn: bool) -> std::result::Result<(Vec<Variant>, Vec<String>), String> {
+    let (mut variants, mut left_out) = (Vec::new(), Vec::new());
+    for name in named {
+        match name {
+            Named::One(variant) => variants.push(variant.clone()),
+            Named::All => {
+                let (usable, others): (Vec<_>, Vec<_>) = known()?.into_iter().partition(|v| has_oidn || !v.needs_oidn());
+                variants.extend(usable);
+                left_out.extend(others.into_iter().map(|v| v.name));
+            }
+        }
+    }
+    Ok((variants, left_out))
 }
 
 /// Name of the whole method, which the ablations are compared with.
@@ -184,7 +249,9 @@ pub fn paper_ablations(probes: u32) -> std::result::Result<Vec<Variant>, String>
 mod tests {
     use super::*;
     use crate::base::named::apply;
+    use crate::method::Need;
     use crate::method::glossy_probes::GlossyProbeParams;
+    use crate::plan::stages::RenderPath;
 
     #[test]
     fn a_variant_tells_options_of_frames_and_bakes_and_parameters_apart() {
@@ -203,6 +270,60 @@ mod tests {
         ] {
             let message = Variant::parse(text).err().unwrap();
             assert!(message.contains(expected), "{text}: {message}");
+        }
+    }
+
+    fn names(named: &[&str], has_oidn: bool) -> (Vec<String>, Vec<String>) {
+        let named: Vec<Named> = named.iter().map(|n| Named::parse(n).unwrap()).collect();
+        let (variants, left_out) = expand(&named, has_oidn).unwrap();
+        (variants.into_iter().map(|v| v.name).collect(), left_out)
+    }
+
+    #[test]
+    fn all_is_every_method_and_its_variants_but_for_a_denoiser_that_is_not_there() {
+        let whole = [
+            "glossy-probes",
+            "glossy-probes-rays",
+            "path-trace",
+            "path-trace-filter",
+            "path-trace-oidn",
+            "ulr",
+            "image-space-gather",
+            "lightmap-rt",
+            "lightmap-rt-oidn",
+            "light-field-probes",
+            "radiance-probes",
+            "many-light",
+        ];
+        assert_eq!(names(&["all"], true), (whole.map(str::to_owned).to_vec(), vec![]));
+        let (without, left_out) = names(&["all"], false);
+        assert_eq!(left_out, ["path-trace-oidn", "lightmap-rt-oidn"]);
+        assert!(without.len() == whole.len() - 2 && left_out.iter().all(|name| !without.contains(name)));
+        // What is asked for by its name stays, and is an error later.
+        assert_eq!(names(&["ulr", "path-trace-oidn"], false).0, ["ulr", "path-trace-oidn"]);
+        let message = Named::parse("path-trace-odin").err().unwrap();
+        assert!(message.contains("there are all, glossy-probes, glossy-probes-rays"), "{message}");
+    }
+
+    /// A row's text is parsed when somebody asks for it, and its options are checked then.
+    #[test]
+    fn variants_of_the_table_are_what_their_methods_take() {
+        for variant in known().unwrap().iter().filter(|v| !v.needs_oidn() || Oidn::found().is_ok()) {
+            let [file, folder] = ["file", "folder"].map(std::path::PathBuf::from);
+            let reads = variant.method.reads;
+            let mut stage = RenderPath {
+                method: Some(variant.method.name.into()),
+                probes: reads.probes.map(|_| folder),
+                lightmap: (reads.lightmap != Need::No).then(|| file.clone()),
+                curvature: (reads.curvature != Need::No).then_some(file),
+                set: variant.sets.clone(),
+                ..RenderPath::default()
+            };
+            for (option, value) in &variant.options {
+                stage.set(option, value.as_deref()).unwrap();
+            }
+            stage.check().unwrap_or_else(|e| panic!("{}: {e}", variant.name));
+            assert_eq!(variant.differences().is_empty(), variant.name == variant.method.name);
         }
     }
 

@@ -1,10 +1,12 @@
 //! `reprobe evaluate`: methods and ablations against one reference.
 
 use crate::preset::Preset;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use reprobe::method::METHODS;
 use reprobe::plan::evaluation::{Evaluate, all_variants};
 use reprobe::plan::option::Size;
 use reprobe::plan::settings::Settings;
-use reprobe::plan::variant::{Given, Variant, parse_bake};
+use reprobe::plan::variant::{ALL, Given, Named, Variant, chosen, parse_bake};
 use reprobe::plan::views::FrameList;
 use reprobe::plan::{Context, Outcome};
 use serde_json::json;
@@ -25,6 +27,9 @@ pub enum Ablations {
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,path-trace
+  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods all --reference-pair --reference-spp 256
+  reprobe evaluate room/scene.xml --path room/path.json -o report/ --methods glossy-probes,glossy-probes-rays,path-trace-oidn \\
+      --reference mitsuba/ --second-reference mitsuba_seed_1/
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --ablations paper --preset medium --reference mitsuba/
   reprobe evaluate room/scene.xml --path room/path.json -o report/ --probes probes/ --lightmap lightmap.exr \\
       --variant one=glossy-probes,gather.probes=1 --variant fast=path-trace,--spp=4
@@ -40,9 +45,9 @@ pub struct Args {
     /// Folder for the report, frames and bakes
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Methods of render-path [default: glossy-probes, where there is no --variant]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Variant::plain)]
-    methods: Vec<Variant>,
+    /// Methods of render-path, and variants of them that are known by name [default: glossy-probes, where there is no --variant]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named())]
+    methods: Vec<Named>,
     /// A method with options of render-path (--spp=4), parameters of its passes (gather.probes=1), or bakes of its own
     /// (bake-probes:--spp=64); may be repeated
     #[arg(long = "variant", value_name = "NAME=METHOD,...", value_parser = Variant::parse)]
@@ -56,6 +61,13 @@ pub struct Args {
     /// Frames to compare with, NNNN.exr; without it, the path is path-traced
     #[arg(long, value_name = "DIR")]
     reference: Option<PathBuf>,
+    /// Those frames rendered with another seed: RMSE, DSSIM and the change from frame to frame are told without the
+    /// references' own noise, too, and the verdict goes by that
+    #[arg(long, value_name = "DIR", requires = "reference")]
+    second_reference: Option<PathBuf>,
+    /// Path-trace the reference twice, with two seeds, for the same
+    #[arg(long, conflicts_with = "reference")]
+    reference_pair: bool,
     /// Defaults of all stages, as for run
     #[arg(long, value_enum, default_value_t = Preset::Draft)]
     preset: Preset,
@@ -92,12 +104,23 @@ pub struct Args {
     /// Stops by which radiance is brightened for the display metrics and the pictures
     #[arg(long, value_name = "E", default_value_t = 0.0, allow_negative_numbers = true)]
     exposure: f32,
-    /// About how large index.html may be, megabytes; it shows pictures of fewer frames where they would take more
+    /// About how large index.html may be, megabytes; where its pictures would take more they are coarser, then smaller, then of
+    /// fewer frames
     #[arg(long, value_name = "MB", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=1000))]
     page_mb: u32,
     /// Print the stages' commands and stop
     #[arg(long)]
     dry_run: bool,
+}
+
+/// The table's methods, each before its variants.
+fn named() -> impl TypedValueParser<Value = Named> {
+    let all = PossibleValue::new(ALL).help("all of these; variants with OIDN where the library is found");
+    let table = METHODS.iter().flat_map(|m| {
+        let variants = m.variants.iter().map(|(name, what)| PossibleValue::new(*name).help(*what));
+        std::iter::once(PossibleValue::new(m.name).help(m.about)).chain(variants)
+    });
+    PossibleValuesParser::new(table.chain([all])).try_map(|name| Named::parse(&name))
 }
 
 impl Args {
@@ -118,13 +141,16 @@ impl Args {
 
 pub fn run(args: &Args, cx: &Context) -> anyhow::Result<Outcome> {
     let settings = args.settings();
-    let variants = all_variants(&args.methods, &args.variants, args.ablations.is_some(), &args.only, settings.probes)?;
+    let methods = chosen(&args.methods, cx)?;
+    let variants = all_variants(&methods, &args.variants, args.ablations.is_some(), &args.only, settings.probes)?;
     let evaluate = Evaluate {
         scene: args.scene.clone(),
         path: args.path.clone(),
         output: args.output.clone(),
         variants,
         reference: args.reference.clone(),
+        second_reference: args.second_reference.clone(),
+        reference_pair: args.reference_pair,
         probes: args.probes.clone(),
         lightmap: args.lightmap.clone(),
         curvature: args.curvature.clone(),

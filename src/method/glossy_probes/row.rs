@@ -43,6 +43,7 @@ pub const METHOD: Method = Method {
     transmissive: false,
     orthographic: false,
     sequential: true,
+    variants: &[("glossy-probes-rays", "rays.per_pixel=4,--denoise")],
     parameters,
     for_scene: as_given,
     cpu,

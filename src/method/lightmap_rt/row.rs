@@ -29,6 +29,7 @@ pub const METHOD: Method = Method {
     transmissive: false,
     orthographic: false,
     sequential: false,
+    variants: &[("lightmap-rt-oidn", "--samples=2,next_event=true,--denoise=oidn")],
     parameters,
     for_scene: as_given,
     cpu,

@@ -30,6 +30,7 @@ pub const METHOD: Method = Method {
     transmissive: true,
     orthographic: true,
     sequential: false,
+    variants: &[("path-trace-filter", "--spp=4,--denoise=filter"), ("path-trace-oidn", "--spp=4,--denoise=oidn")],
     parameters,
     for_scene,
     cpu,

@@ -27,6 +27,7 @@ pub const METHOD: Method = Method {
     transmissive: false,
     orthographic: false,
     sequential: false,
+    variants: &[],
     parameters,
     for_scene: as_given,
     cpu,

@@ -1,6 +1,6 @@
 //! The tables of §7.3 as Markdown.
 
-use super::{COLUMNS, Costs, Evaluation, MethodErrors, number};
+use super::{Costs, Evaluation, number};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -8,14 +8,20 @@ use std::fmt::Write;
 pub fn markdown(evaluation: &Evaluation, costs: &Costs) -> String {
     let [w, h] = evaluation.size;
     let mut out = format!(
-        "# {}, {}\n\n{} frames of {w} x {h}. Reference: {}. Errors are of display values (linear radiance times 2^{}, clamped, sRGB): \
-         RMSE, DSSIM = (1 - SSIM) / 2, FLIP; *change* is the mean change of the signed error from one frame to the next. Lower is better.\n",
+        "# {}, {}\n\n{} frames of {w} x {h}. Reference: {}. {}\n",
         evaluation.scene,
         evaluation.path,
         evaluation.frames.len(),
         evaluation.reference,
-        evaluation.exposure,
+        evaluation.note(),
     );
+    let variants = evaluation.variants(costs);
+    if !variants.is_empty() {
+        out += "\n";
+    }
+    for line in variants {
+        let _ = writeln!(out, "- {line}");
+    }
     for layer in &evaluation.layers {
         let _ = write!(out, "\n## Error, {}\n\n", layer_title(layer));
         for line in evaluation.verdict(layer, costs) {
@@ -47,14 +53,15 @@ fn head(cells: &[&str]) -> String {
 
 /// Table 1.
 fn errors(evaluation: &Evaluation, layer: &str, costs: &Costs) -> String {
-    let names: Vec<&str> = ["method"].into_iter().chain(COLUMNS.map(|c| c.1)).chain(["ms a frame"]).collect();
+    let columns: Vec<_> = evaluation.columns().collect();
+    let names: Vec<&str> = ["method"].into_iter().chain(columns.iter().map(|c| c.name)).chain(["ms a frame"]).collect();
     let mut out = format!("\n{}", head(&names));
-    let rows: Vec<_> = evaluation.contenders().filter_map(|m| Some((m, m.layers.get(layer)?.mean.columns()))).collect();
-    for (method, columns) in &rows {
-        let cells = columns.iter().enumerate().map(|(i, value)| match value {
+    let rows: Vec<_> = evaluation.contenders().filter_map(|m| Some((m, &m.layers.get(layer)?.mean))).collect();
+    for (method, mean) in &rows {
+        let cells = columns.iter().map(|c| match (c.of)(mean) {
             None => "-".into(),
-            Some(x) if rows.len() > 1 && rows.iter().all(|(_, c)| c[i] >= Some(*x)) => format!("**{}**", number(*x)),
-            Some(x) => number(*x),
+            Some(x) if rows.len() > 1 && rows.iter().all(|(_, other)| (c.of)(other) >= Some(x)) => format!("**{}**", number(x)),
+            Some(x) => number(x),
         });
         let ms = costs.methods.get(&method.name).map_or("-".into(), |c| format!("{:.0}", c.frame_ms));
         out += &row([method.name.clone()].into_iter().chain(cells).chain([ms]));
@@ -64,24 +71,23 @@ fn errors(evaluation: &Evaluation, layer: &str, costs: &Costs) -> String {
 
 /// Figures 12 to 15 as numbers.
 fn ablations(evaluation: &Evaluation, layer: &str) -> String {
-    let of = |m: &MethodErrors| Some(m.layers.get(layer)?.mean);
+    let columns: Vec<_> = evaluation.judging().collect();
     let mut out = String::new();
     for method in &evaluation.methods {
-        let (Some(ablation), Some(errors)) = (&method.ablation, of(method)) else { continue };
+        let (Some(ablation), Some(errors)) = (&method.ablation, method.layers.get(layer)) else { continue };
         if out.is_empty() {
-            out = format!(
-                "\nAblations: error, and in brackets that of what it is compared with\n\n{}",
-                head(&["figure", "variant", "what", "RMSE RGB", "DSSIM RGB", "FLIP", "change", "against"])
-            );
+            let names = columns.iter().map(|c| c.name);
+            let names: Vec<&str> = ["figure", "variant", "what"].into_iter().chain(names).chain(["against"]).collect();
+            out = format!("\nAblations: error, and in brackets that of what it is compared with\n\n{}", head(&names));
         }
-        let against = evaluation.method(&ablation.against).and_then(of);
-        let cell = |column: usize| {
+        let against = evaluation.method(&ablation.against).and_then(|m| m.layers.get(layer));
+        let cells = columns.iter().map(|c| {
             let text = |x: Option<f64>| x.map_or("-".into(), number);
-            let base = against.map_or(String::new(), |b| format!(" ({})", text(b.columns()[column])));
-            text(errors.columns()[column]) + &base
-        };
+            let base = against.map_or(String::new(), |b| format!(" ({})", text((c.of)(&b.mean))));
+            text((c.of)(&errors.mean)) + &base
+        });
         let names = [ablation.figure.clone(), method.name.clone(), ablation.what.clone()];
-        out += &row(names.into_iter().chain([0, 2, 4, 5].map(cell)).chain([ablation.against.clone()]));
+        out += &row(names.into_iter().chain(cells).chain([ablation.against.clone()]));
     }
     out
 }
@@ -141,7 +147,7 @@ fn probes(evaluation: &Evaluation, costs: &Costs) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metric::evaluation::tests::example;
+    use crate::metric::evaluation::tests::{example, with_pair};
 
     #[test]
     fn tables_have_a_row_a_method_and_the_best_in_bold() {
@@ -161,6 +167,22 @@ mod tests {
         for block in text.split("\n\n").filter(|b| b.lines().all(table)) {
             let columns: BTreeSet<usize> = block.lines().map(|l| l.matches('|').count()).collect();
             assert_eq!(columns.len(), 1, "{block}");
+        }
+    }
+
+    #[test]
+    fn what_is_clean_stands_beside_what_is_not() {
+        let (_, mut costs) = example();
+        costs.methods.entry("ours".to_owned()).and_modify(|c| c.denoiser = Some("oidn 2.3.0".into()));
+        let text = markdown(&with_pair(), &costs);
+        for part in [
+            "| method | RMSE RGB | clean RMSE RGB |",
+            "| ours | **.0300** | .0150 |",
+            "| Fig. 14 | one-probe | one probe | .0300 (.0150) |",
+            "without the reference's own noise",
+            "- ours: glossy-probes, denoised by oidn 2.3.0\n",
+        ] {
+            assert!(text.contains(part), "{part}\n{text}");
         }
     }
 }

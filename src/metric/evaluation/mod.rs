@@ -1,12 +1,16 @@
 //! Methods against one reference: `evaluation.json`, the tables of §7.3 in Markdown, and a page to look at.
 
+mod columns;
 mod markdown;
 mod page;
+mod pictures;
 
 pub use markdown::markdown;
-pub use page::{Pictures, Shown, html, jpeg_gray, jpeg_rgb};
+pub use page::html;
+pub use pictures::{Detail, Gallery, Pictures, Shown};
 
 use super::Metrics;
+use super::without_noise::WithoutNoise;
 use crate::io::Provenance;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -26,6 +30,9 @@ pub struct Evaluation {
     pub exposure: f32,
     /// Names of the frames, in order.
     pub frames: Vec<String>,
+    /// Frames a second of the camera path; `None` where it does not say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fps: Option<f64>,
     /// Layers that were compared: `glossy`, `full`.
     pub layers: Vec<String>,
     /// The methods, in the order asked for.
@@ -77,16 +84,42 @@ pub struct FrameErrors {
     pub metrics: Metrics,
     /// Change of the error since the frame before ([`crate::metric::temporal`]); `None` where that frame is not there.
     pub change: Option<f64>,
+    /// Errors without the reference's noise, where there are two references.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without_noise: Option<Clean>,
+}
+
+/// Where [`FrameErrors::without_noise`] stands in `evaluation.json`.
+const WITHOUT_NOISE: &str = "without_noise";
+
+/// Errors of one frame without the reference's noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Clean {
+    /// Errors of the frame, as `compare` tells them.
+    #[serde(flatten)]
+    pub errors: WithoutNoise,
+    /// Change of the error since the frame before ([`crate::metric::temporal::change_rms`]); `None` where that frame is not there.
+    pub change_rms: Option<f64>,
 }
 
 impl LayerErrors {
     /// With the means of `frames`.
     pub fn new(frames: Vec<FrameErrors>) -> Self {
         let metrics: Vec<Metrics> = frames.iter().map(|f| f.metrics).collect();
-        let changes: Vec<f64> = frames.iter().filter_map(|f| f.change).collect();
-        let change = (!changes.is_empty()).then(|| changes.iter().sum::<f64>() / changes.len() as f64);
-        Self { mean: FrameErrors { metrics: Metrics::mean(&metrics), change }, frames }
+        let clean: Option<Vec<Clean>> = frames.iter().map(|f| f.without_noise).collect();
+        let without_noise = clean.map(|clean| Clean {
+            errors: WithoutNoise::mean(&clean.iter().map(|c| c.errors).collect::<Vec<_>>()),
+            change_rms: mean(clean.iter().filter_map(|c| c.change_rms)),
+        });
+        let change = mean(frames.iter().filter_map(|f| f.change));
+        Self { mean: FrameErrors { metrics: Metrics::mean(&metrics), change, without_noise }, frames }
     }
+}
+
+/// `None` of nothing.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 /// What the methods cost. Kept apart from [`Evaluation`], as no two runs take the same time.
@@ -122,6 +155,9 @@ pub struct MethodCost {
     pub precompute_seconds: Option<f64>,
     /// Its probes.
     pub probes: Option<ProbeCost>,
+    /// What the noise was taken out by; `None` for nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoiser: Option<String>,
 }
 
 /// A set of probes.
@@ -137,24 +173,6 @@ pub struct ProbeCost {
     pub bytes: u64,
 }
 
-/// The columns of the error tables: field, short name.
-pub(crate) const COLUMNS: [(&str, &str); 6] = [
-    ("rmse_rgb", "RMSE RGB"),
-    ("rmse_lum", "RMSE Lum."),
-    ("dssim_rgb", "DSSIM RGB"),
-    ("dssim_lum", "DSSIM Lum."),
-    ("flip", "FLIP"),
-    ("change", "change"),
-];
-
-impl FrameErrors {
-    /// The columns of the error tables.
-    pub(crate) fn columns(&self) -> [Option<f64>; 6] {
-        let m = &self.metrics;
-        [Some(m.rmse_rgb), Some(m.rmse_lum), Some(m.dssim_rgb), Some(m.dssim_lum), Some(m.flip), self.change]
-    }
-}
-
 impl Evaluation {
     /// Methods in their own right.
     pub fn contenders(&self) -> impl Iterator<Item = &MethodErrors> {
@@ -166,6 +184,16 @@ impl Evaluation {
         self.methods.iter().find(|m| m.name == name)
     }
 
+    /// Methods that are not what their name says alone: the name, the method, what differs from its defaults, and which denoiser it was.
+    pub fn variants(&self, costs: &Costs) -> Vec<String> {
+        let line = |m: &MethodErrors| {
+            let denoiser = costs.methods.get(&m.name).and_then(|c| c.denoiser.as_ref());
+            let by = denoiser.map_or(String::new(), |d| format!(", denoised by {d}"));
+            format!("{}: {}{by}", m.name, [std::slice::from_ref(&m.method), &m.options[..]].concat().join(", "))
+        };
+        self.contenders().filter(|m| m.name != m.method || !m.options.is_empty()).map(line).collect()
+    }
+
     /// What the numbers of a layer say, in sentences: who is best, by how much, and in how many frames.
     pub fn verdict(&self, layer: &str, costs: &Costs) -> Vec<String> {
         let contenders: Vec<_> = self.contenders().filter_map(|m| Some((m, m.layers.get(layer)?))).collect();
@@ -173,24 +201,28 @@ impl Evaluation {
             return Vec::new();
         }
         let mut lines = Vec::new();
-        for column in [0, 2, 4, 5] {
-            let mean = |l: &LayerErrors| l.mean.columns()[column];
-            let mut order: Vec<_> = contenders.iter().filter_map(|(m, l)| Some((*m, *l, mean(l)?))).collect();
+        for column in self.judging() {
+            let mut order: Vec<_> = contenders.iter().filter_map(|(m, l)| Some((*m, *l, (column.of)(&l.mean)?))).collect();
             order.sort_by(|a, b| a.2.total_cmp(&b.2));
             let [(best, best_layer, error), (second, _, next), ..] = order[..] else { continue };
-            let of = |l: &LayerErrors, frame: usize| l.frames[frame].columns()[column];
+            let of = |l: &LayerErrors, frame: usize| (column.of)(&l.frames[frame]);
             let frames: Vec<usize> = (0..self.frames.len()).filter(|&f| of(best_layer, f).is_some()).collect();
             let wins = frames.iter().filter(|&&f| contenders.iter().all(|(_, l)| of(best_layer, f) <= of(l, f))).count();
-            let what = if column == 5 { "The error changes least from frame to frame with" } else { "Least" };
-            let name = if column == 5 { String::new() } else { format!(" {}:", COLUMNS[column].1) };
+            let what = match column.is_change() {
+                true => "The error changes least from frame to frame with".to_owned(),
+                false => format!("Least {}:", column.name),
+            };
             lines.push(format!(
-                "{what}{name} {}, {}, before {}, {}; best in {wins} of {} frames.",
+                "{what} {}, {}, before {}, {}; best in {wins} of {} frames.",
                 best.name,
                 number(error),
                 second.name,
                 number(next),
                 frames.len()
             ));
+        }
+        if let Some(noise) = self.noise(layer) {
+            lines.push(format!("The reference's own noise is {} by RMSE RGB.", number(noise)));
         }
         let time = |m: &MethodErrors| costs.methods.get(&m.name).map(|c| c.frame_ms).filter(|&ms| ms > 0.0);
         let mut times: Vec<_> = contenders.iter().filter_map(|(m, _)| Some((time(m)?, &m.name))).collect();
@@ -213,7 +245,8 @@ pub(crate) mod tests {
     use super::*;
 
     fn frame(rmse: f64, change: Option<f64>) -> FrameErrors {
-        FrameErrors { metrics: Metrics { rmse_rgb: rmse, dssim_rgb: 2.0 * rmse, ..Metrics::default() }, change }
+        let metrics = Metrics { rmse_rgb: rmse, dssim_rgb: 2.0 * rmse, ..Metrics::default() };
+        FrameErrors { metrics, change, without_noise: None }
     }
 
     /// Two methods and an ablation over two frames.
@@ -233,6 +266,7 @@ pub(crate) mod tests {
             reference: "path-trace".into(),
             exposure: 0.0,
             frames: vec!["0000".into(), "0001".into()],
+            fps: None,
             layers: vec!["glossy".into()],
             methods: vec![
                 method("ours", None, [0.02, 0.04]),
@@ -247,6 +281,7 @@ pub(crate) mod tests {
             frame_ms: 42.0,
             precompute_seconds: Some(61.0),
             probes: Some(probes),
+            denoiser: None,
         };
         let stage = StageCost {
             command: "reprobe curvature".into(),
@@ -255,6 +290,33 @@ pub(crate) mod tests {
             seconds: Some(61.0),
         };
         (evaluation, Costs { stages: vec![stage], methods: [("ours".to_owned(), cost)].into() })
+    }
+
+    /// The same with two references, of whose noise half of every error was: but for the second method, which has none else.
+    pub fn with_pair() -> Evaluation {
+        let (mut evaluation, _) = example();
+        for (i, method) in evaluation.methods.iter_mut().enumerate() {
+            for layer in method.layers.values_mut() {
+                let of = |f: &FrameErrors| {
+                    let share = if i == 1 { 0.1 } else { 0.5 };
+                    let errors =
+                        WithoutNoise { rmse_rgb: share * f.metrics.rmse_rgb, noise_rmse_rgb: 0.005, ..WithoutNoise::default() };
+                    let clean = Clean { errors, change_rms: f.change.map(|c| share * c) };
+                    FrameErrors { without_noise: Some(clean), ..*f }
+                };
+                *layer = LayerErrors::new(layer.frames.iter().map(of).collect());
+            }
+        }
+        evaluation
+    }
+
+    #[test]
+    fn the_verdict_goes_by_what_is_clean() {
+        let (_, costs) = example();
+        let lines = with_pair().verdict("glossy", &costs);
+        assert_eq!(lines[0], "Least clean RMSE RGB: </script>theirs, .0045, before ours, .0150; best in 2 of 2 frames.");
+        assert!(lines.contains(&"The reference's own noise is .0050 by RMSE RGB.".to_owned()), "{lines:?}");
+        assert!(lines[3].ends_with("theirs, .0010, before ours, .0050; best in 1 of 1 frames."), "{lines:?}");
     }
 
     #[test]
@@ -279,9 +341,10 @@ pub(crate) mod tests {
         let (evaluation, _) = example();
         let json = serde_json::to_value(&evaluation).unwrap();
         let glossy = &json["methods"][0]["layers"]["glossy"];
-        for (key, _) in COLUMNS {
+        for key in ["rmse_rgb", "rmse_lum", "dssim_rgb", "dssim_lum", "flip", "change"] {
             assert!(glossy["mean"][key].is_number() && glossy["frames"][1][key].is_number(), "{key}");
         }
+        assert!(glossy["mean"].get(WITHOUT_NOISE).is_none());
         assert!(!json.to_string().contains("_ms"));
     }
 }

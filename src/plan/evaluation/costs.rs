@@ -61,7 +61,7 @@ fn method_cost(frames: &Path, probes: Option<&Path>, name: &str, costs: &Costs, 
     let mine = costs.stages.iter().filter(|s| s.methods.iter().any(|m| m == name));
     let precompute_seconds = mine.map(|s| s.seconds).sum::<Option<f64>>().filter(|&s| s > 0.0);
     let probes = probes.and_then(|folder| probe_cost(folder, scene));
-    MethodCost { frame_ms, passes_ms, precompute_seconds, probes }
+    MethodCost { frame_ms, passes_ms, precompute_seconds, probes, denoiser: timings.denoiser }
 }
 
 /// What a set of probes holds; `None` for a folder of something else.

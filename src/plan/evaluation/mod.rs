@@ -14,12 +14,14 @@ use crate::base::named::within;
 use crate::io::provenance::hash_file;
 use crate::io::{Provenance, atomic, json};
 use crate::method::path_trace;
-use crate::metric::evaluation::{Costs, Evaluation, MethodErrors, html, markdown};
+use crate::metric::evaluation::{Costs, Evaluation, LayerErrors, MethodErrors, html, markdown};
+use crate::scene::camera_path;
 use crate::{Error, Result};
 use costs::execute;
 use measure::{Subjects, file, layers, measure};
 pub use plan::{Plan, Planned};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What to evaluate.
@@ -35,6 +37,10 @@ pub struct Evaluate {
     pub variants: Vec<Variant>,
     /// Frames to compare with; without them, the path is path-traced.
     pub reference: Option<PathBuf>,
+    /// The same frames of another seed, by which the reference's noise is taken out of the errors.
+    pub second_reference: Option<PathBuf>,
+    /// Whether the path is path-traced twice for that.
+    pub reference_pair: bool,
     /// Baked probes to use.
     pub probes: Option<PathBuf>,
     /// Light map to use.
@@ -94,6 +100,14 @@ impl Evaluate {
     /// Plans all stages and checks each of them; reads nothing.
     pub fn plan(&self, cx: &Context) -> Result<Plan> {
         within("--exposure", self.exposure, -32.0..=32.0)?;
+        if self.reference.is_none() && self.second_reference.is_some() {
+            let message = "--second-reference: the first one is missing: --reference DIR; --reference-pair renders both";
+            return Err(Error::Request(message.into()));
+        }
+        if self.reference.is_some() && self.reference_pair {
+            let message = "--reference-pair: the reference is given: expected another of its frames with --second-reference DIR";
+            return Err(Error::Request(message.into()));
+        }
         let plan = plan::plan(self, cx)?;
         for planned in plan.stages() {
             planned.stage.check().map_err(|e| Error::Request(format!("{}: {e}", planned.stage.command_line(cx))))?;
@@ -101,18 +115,31 @@ impl Evaluate {
         Ok(plan)
     }
 
-    fn reference_folder(&self) -> PathBuf {
-        self.reference.clone().unwrap_or_else(|| self.output.join("reference"))
+    /// The folder of the reference, and that of a second render of it where there is one.
+    fn reference_folders(&self) -> Vec<PathBuf> {
+        let first = self.reference.clone().unwrap_or_else(|| self.output.join("reference"));
+        let second = self.reference_pair.then(|| self.output.join("second-reference"));
+        std::iter::once(first).chain(self.second_reference.clone().or(second)).collect()
     }
 
     fn frames_folder(&self, variant: &Variant) -> PathBuf {
         self.output.join("frames").join(&variant.name)
     }
 
-    /// A reference that is as noisy as what it judges measures its own noise.
+    fn reference_in_words(&self) -> String {
+        let name = |folder: &Path| folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let first = self.reference.as_ref().map_or_else(
+            || format!("path-trace, {} samples a pixel", self.settings.reference_spp),
+            |folder| format!("the frames of {}", name(folder)),
+        );
+        let second = self.second_reference.as_ref().map(|folder| format!(" and of {}", name(folder)));
+        first + &second.unwrap_or_else(|| if self.reference_pair { ", with two seeds".into() } else { String::new() })
+    }
+
+    /// A reference that is as noisy as what it judges measures its own noise, unless that is taken out.
     fn warn_of_noise(&self, cx: &Context, plan: &Plan) -> Result<()> {
         let spp = self.settings.reference_spp;
-        if self.reference.is_some() {
+        if self.reference.is_some() || self.reference_pair {
             return Ok(());
         }
         for (variant, planned) in self.variants.iter().zip(&plan.frames) {
@@ -123,7 +150,7 @@ impl Evaluate {
             {
                 cx.listener.warn(&format!(
                     "{} has {samples} samples a pixel, its reference {spp}: most of what is measured is the reference's noise; \
-                     give --reference-spp some {}",
+                     give --reference-spp some {}, or --reference-pair, which takes it out",
                     variant.name,
                     samples.saturating_mul(8)
                 ));
@@ -145,10 +172,10 @@ impl Evaluate {
         let frames: Vec<u32> = views.iter().map(|v| v.frame).collect();
         let size = views[0].camera.size;
         let folders: Vec<PathBuf> = self.variants.iter().map(|v| self.frames_folder(v)).collect();
-        let reference = self.reference_folder();
+        let references = self.reference_folders();
         let subjects = Subjects {
             methods: &folders,
-            reference: &reference,
+            references: &references,
             frames: &frames,
             size,
             exposure: self.exposure,
@@ -164,7 +191,7 @@ impl Evaluate {
         json::write(&self.output.join("evaluation.json"), &evaluation)?;
         atomic::write(&self.output.join("evaluation.md"), markdown(&evaluation, &costs).as_bytes())?;
         let page = self.output.join("index.html");
-        atomic::write(&page, html(&evaluation, &costs, &measured.shown)?.as_bytes())?;
+        atomic::write(&page, html(&evaluation, &costs, &measured.gallery)?.as_bytes())?;
         Ok(outcome(&evaluation, &costs, &page, clock()))
     }
 
@@ -175,14 +202,16 @@ impl Evaluate {
         frames: &[u32],
         size: [u32; 2],
         layers: &[&str],
-        errors: Vec<std::collections::BTreeMap<String, crate::metric::evaluation::LayerErrors>>,
+        errors: Vec<BTreeMap<String, LayerErrors>>,
     ) -> Result<Evaluation> {
         let mut provenance = Provenance::new("evaluate", scene_hash, cx.seed, &json!({ "exposure": self.exposure }));
         for variant in &self.variants {
             let hash = hash_frames(&self.frames_folder(variant), frames)?;
             provenance = provenance.with_input(&format!("frames/{}", variant.name), hash);
         }
-        provenance = provenance.with_input("reference", hash_frames(&self.reference_folder(), frames)?);
+        for (role, folder) in ["reference", "second-reference"].into_iter().zip(self.reference_folders()) {
+            provenance = provenance.with_input(role, hash_frames(&folder, frames)?);
+        }
         let methods = self.variants.iter().zip(errors).map(|(v, layers)| MethodErrors {
             name: v.name.clone(),
             method: v.method.name.into(),
@@ -194,12 +223,10 @@ impl Evaluate {
             scene: scene_name(&self.scene),
             path: stem(&self.path),
             size: size.map(|n| n as usize),
-            reference: self.reference.as_ref().map_or_else(
-                || format!("path-trace, {} samples a pixel", self.settings.reference_spp),
-                |folder| format!("the frames of {}", folder.file_name().unwrap_or_default().to_string_lossy()),
-            ),
+            reference: self.reference_in_words(),
             exposure: self.exposure,
             frames: frames.iter().map(|f| format!("{f:04}")).collect(),
+            fps: camera_path::fps(&self.path)?,
             layers: layers.iter().map(|l| (*l).to_owned()).collect(),
             methods: methods.collect(),
             provenance,
@@ -208,19 +235,11 @@ impl Evaluate {
 }
 
 fn outcome(evaluation: &Evaluation, costs: &Costs, page: &Path, seconds: f64) -> Outcome {
-    let mut summary = String::new();
-    for layer in &evaluation.layers {
-        summary += &format!("{layer}: mean over {} frames\n", evaluation.frames.len());
-        for (method, errors) in evaluation.methods.iter().filter_map(|m| Some((m, m.layers.get(layer)?))) {
-            let m = errors.mean.metrics;
-            summary += &format!("  {:28} RMSE {:.4}  DSSIM {:.4}  FLIP {:.4}\n", method.name, m.rmse_rgb, m.dssim_rgb, m.flip);
-        }
-    }
     let means =
         |m: &MethodErrors| -> Value { m.layers.iter().map(|(layer, errors)| (layer.clone(), json!(errors.mean))).collect() };
     let methods: Value = evaluation.methods.iter().map(|m| (m.name.clone(), means(m))).collect();
     Outcome {
-        summary: format!("{summary}see {}\nDone in {seconds:.0} s.", page.display()),
+        summary: format!("{}see {}\nDone in {seconds:.0} s.", evaluation.table(), page.display()),
         figures: json!({ "methods": methods, "costs": costs, "seconds": seconds }),
         ..Outcome::default()
     }

@@ -20,7 +20,7 @@ pub struct Planned {
     pub stage: Stage,
     /// Its seed.
     pub seed: u32,
-    /// Who reads its output; empty for the reference.
+    /// Who reads its output; empty for references.
     pub users: Vec<usize>,
 }
 
@@ -31,14 +31,14 @@ pub struct Plan {
     pub bakes: Vec<Planned>,
     /// The frames of each variant.
     pub frames: Vec<Planned>,
-    /// Unless it was given.
-    pub reference: Option<Planned>,
+    /// One or two, unless they were given.
+    pub references: Vec<Planned>,
 }
 
 impl Plan {
     /// The stages in order.
     pub fn stages(&self) -> impl Iterator<Item = &Planned> {
-        self.bakes.iter().chain(&self.frames).chain(&self.reference)
+        self.bakes.iter().chain(&self.frames).chain(&self.references)
     }
 
     /// The probes that a variant reads, where it does.
@@ -116,9 +116,11 @@ pub fn plan(of: &Evaluate, cx: &Context) -> Result<Plan> {
     plan.bakes.sort_by_key(|p| BAKES.iter().position(|command| *command == p.stage.command()));
     if of.reference.is_none() {
         let lights = common_lights(&plan.frames)?;
-        let stage = RenderPath { lights, ..pipeline.reference(&of.reference_folder()) }.into();
-        // Not the samples of a path-traced method, whose errors would be the reference's.
-        plan.reference = Some(Planned { stage, seed: cx.seed.wrapping_add(1), users: Vec::new() });
+        for (folder, offset) in of.reference_folders().iter().zip(1..) {
+            let stage = RenderPath { lights: lights.clone(), ..pipeline.reference(folder) }.into();
+            // Not the samples of a path-traced method, whose errors would be the reference's, and of two not the same.
+            plan.references.push(Planned { stage, seed: cx.seed.wrapping_add(offset), users: Vec::new() });
+        }
     }
     Ok(plan)
 }
@@ -224,6 +226,8 @@ mod tests {
             output: "out".into(),
             variants: variants.iter().map(|v| Variant::parse(v).unwrap()).collect(),
             reference: None,
+            second_reference: None,
+            reference_pair: false,
             probes: None,
             lightmap: None,
             curvature: None,
@@ -307,17 +311,32 @@ mod tests {
     #[test]
     fn the_reference_has_the_frames_lights() {
         let lit = ["a=path-trace,--spp=4,--lights=l.json", "b=many-light,--lights=l.json"];
-        let Stage::RenderPath(reference) = plan(&evaluate(&lit, &[]), &context()).unwrap().reference.unwrap().stage else {
-            panic!()
-        };
-        assert_eq!(reference.lights, Some("l.json".into()));
+        let pair = Evaluate { reference_pair: true, ..evaluate(&lit, &[]) };
+        let references = plan(&pair, &context()).unwrap().references;
+        assert_eq!(references.len(), 2);
+        for reference in &references {
+            assert!(matches!(&reference.stage, Stage::RenderPath(stage) if stage.lights == Some("l.json".into())));
+        }
         let message = plan(&evaluate(&[lit[0], "b=path-trace,--spp=8"], &[]), &context()).err().unwrap().to_string();
         assert!(message.contains("the same"), "{message}");
     }
 
     #[test]
-    fn the_references_samples_are_its_own() {
-        let plan = evaluate(&["pt=path-trace"], &[]).plan(&context()).unwrap();
-        assert_eq!((plan.frames[0].seed, plan.reference.unwrap().seed), (3, 4));
+    fn the_references_samples_are_their_own() {
+        let one = evaluate(&["pt=path-trace"], &[]);
+        let pair = Evaluate { reference_pair: true, ..one.clone() };
+        let seeds = |of: &Evaluate| of.plan(&context()).unwrap().stages().map(|p| p.seed).collect::<Vec<_>>();
+        assert_eq!((seeds(&one), seeds(&pair)), (vec![3, 4], vec![3, 4, 5]));
+    }
+
+    #[test]
+    fn a_second_reference_needs_a_first() {
+        let alone = Evaluate { second_reference: Some("b".into()), ..evaluate(&["pt=path-trace"], &[]) };
+        let message = alone.plan(&context()).err().unwrap().to_string();
+        assert!(message.contains("--reference DIR") && message.contains("--reference-pair"), "{message}");
+        let given = Evaluate { reference: Some("a".into()), ..alone };
+        assert!(given.plan(&context()).unwrap().references.is_empty());
+        let both = Evaluate { reference_pair: true, second_reference: None, ..given };
+        assert!(both.plan(&context()).err().unwrap().to_string().contains("--reference-pair"));
     }
 }

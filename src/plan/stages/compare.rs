@@ -144,11 +144,7 @@ impl Compare {
         let mut frame = FrameMetrics { name: pair.name.clone(), metrics: comparison.metrics, without_noise: None };
         if let Some(second) = &self.second_reference {
             let fc = if second.is_dir() { second.join(fb.file_name().unwrap_or_default()) } else { second.clone() };
-            let [_, c] = read_pair(fa, &fc, self.layer())?;
-            if b == c {
-                let message = format!("has the pixels of {}: expected the reference rendered with another seed", fb.display());
-                return Err(Error::input(&fc, message));
-            }
+            let c = read_second((fb, &b), &fc, self.layer())?;
             frame.without_noise = Some(without_noise(&a, [&b, &c], self.exposure()));
             files.push(fc);
         }
@@ -166,12 +162,8 @@ impl Compare {
 
 /// One layer (`full` for the image itself) of a frame and of its reference, fit to be compared.
 pub fn read_pair(fa: &Path, fb: &Path, layer: &str) -> Result<[Raster; 2]> {
-    let layer = if layer == "full" { "" } else { layer };
     let (a, b) = (read(fa, layer)?, read(fb, layer)?);
-    if a.size != b.size {
-        let [(wa, ha), (wb, hb)] = [(a.size[0], a.size[1]), (b.size[0], b.size[1])];
-        return Err(Error::input(fa, format!("has {wa} x {ha} pixels, {} has {wb} x {hb}: expected one size", fb.display())));
-    }
+    check_sizes([fa, fb], [a.size, b.size])?;
     if a.size.iter().any(|&n| n < ssim::WINDOW) {
         let n = ssim::WINDOW;
         let message = format!("found {} x {} pixels, expected at least {n} x {n}: the window of SSIM", a.size[0], a.size[1]);
@@ -180,9 +172,28 @@ pub fn read_pair(fa: &Path, fb: &Path, layer: &str) -> Result<[Raster; 2]> {
     Ok([a, b])
 }
 
+/// The same layer of the second render of a reference.
+pub fn read_second((first, b): (&Path, &Raster), second: &Path, layer: &str) -> Result<Raster> {
+    let c = read(second, layer)?;
+    check_sizes([first, second], [b.size, c.size])?;
+    if *b == c {
+        let message = format!("has the pixels of {}: expected the reference rendered with another seed", first.display());
+        return Err(Error::input(second, message));
+    }
+    Ok(c)
+}
+
+fn check_sizes([fa, fb]: [&Path; 2], [a, b]: [[usize; 2]; 2]) -> Result<()> {
+    if a == b {
+        return Ok(());
+    }
+    let [(wa, ha), (wb, hb)] = [(a[0], a[1]), (b[0], b[1])];
+    Err(Error::input(fa, format!("has {wa} x {ha} pixels, {} has {wb} x {hb}: expected one size", fb.display())))
+}
+
 fn read(path: &Path, layer: &str) -> Result<Raster> {
     let image = ExrImage::read(path)?;
-    let pixels = image.rgb(path, layer)?;
+    let pixels = image.rgb(path, if layer == "full" { "" } else { layer })?;
     if let Some(i) = pixels.iter().position(|p| !p.is_finite()) {
         let (x, y) = (i % image.width, i / image.width);
         return Err(Error::input(path, format!("pixel ({x}, {y}) is {}: expected finite radiance", pixels[i])));

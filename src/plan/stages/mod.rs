@@ -23,7 +23,7 @@ pub use bake_lightfield::BakeLightfield;
 pub use bake_lightmap::{AO_DISTANCE, BakeLightmap};
 pub use bake_probes::BakeProbes;
 pub use bake_transport::BakeTransport;
-pub use compare::{Compare, frame_names, read_pair};
+pub use compare::{Compare, frame_names, read_pair, read_second};
 pub use curvature::Curvature;
 pub use export_gltf::ExportGltf;
 pub use export_probes::{ExportProbes, Format};
