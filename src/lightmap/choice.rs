@@ -1,6 +1,7 @@
 //! Which samples of a texel count (see [`crate::lightmap::visible`]), and the regions that they fall into.
 
 use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, PART, Pass, Plan};
+use super::texels::Point;
 use super::visible::Sight;
 use crate::base::math::{Rgb, hash_words};
 use crate::material::Surface;
@@ -31,9 +32,15 @@ impl Plan<'_> {
     }
 
     /// Sample `i` of a texel: its place and the rest of its random numbers.
-    pub(super) fn draw(&self, pass: &Pass, texel: usize, back: bool, i: u32) -> (Surface, Sampler) {
+    pub(super) fn place(&self, pass: &Pass, texel: usize, back: bool, i: u32) -> (Point, Sampler) {
         let mut sampler = Sampler::new(self.stream(pass, texel, back), i);
-        (self.visibility().sample(texel, sampler.next_2d()), sampler)
+        (self.texels.point(&self.world.scene.geometry, &self.atlas, texel, sampler.next_2d()), sampler)
+    }
+
+    /// The same, with the surface there.
+    pub(super) fn draw(&self, pass: &Pass, texel: usize, back: bool, i: u32) -> (Surface, Sampler) {
+        let (point, sampler) = self.place(pass, texel, back, i);
+        (self.visibility().surface(point), sampler)
     }
 
     pub(super) fn light(&self, pass: &Pass, surface: &Surface, back: bool, mut sampler: Sampler) -> Rgb {

@@ -179,11 +179,12 @@ impl Surfaces<'_> {
         if square >= 1.0 || cos <= 0.0 {
             return 0.0;
         }
-        let near = (1.0 - square).powi(2) * (-self.params.normal_power * (1.0 - cos)).exp();
-        let Some(by) = by.filter(|_| i != j) else { return near };
-        let difference = by[i].color - by[j].color;
-        let noise = (by[i].variance + by[j].variance) * self.params.sigma.powi(2) + f32::MIN_POSITIVE;
-        near * (-luminance(difference * difference) / noise).exp()
+        let unlike = by.filter(|_| i != j).map_or(0.0, |by| {
+            let difference = by[i].color - by[j].color;
+            let noise = (by[i].variance + by[j].variance) * self.params.sigma.powi(2) + f32::MIN_POSITIVE;
+            luminance(difference * difference) / noise
+        });
+        (1.0 - square).powi(2) * (-self.params.normal_power * (1.0 - cos) - unlike).exp()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, PART, Pass, Plan, SPLIT};
 use super::choice::Choice;
 use super::parts::{Record, WORDS};
+use super::texels::Point;
 use super::visible::Sight;
 use crate::Result;
 use crate::base::math::Rgb;
@@ -112,9 +113,9 @@ impl Plan<'_> {
         let stream = self.stream(pass, texel as usize, back);
         let wo = [if back { -1.0 } else { 1.0 }, 0.0, 0.0];
         let start = |&(sample, _): &(u32, u8)| {
-            let (surface, _) = self.draw(pass, texel as usize, back, sample);
-            let [u, v] = surface.barycentric.to_array();
-            PathStart { triangle: surface.triangle, u, v, stream, wo, first: sample, end: sample + 1, padding: [0; 3] }
+            let (Point { triangle, barycentric }, _) = self.place(pass, texel as usize, back, sample);
+            let [u, v] = barycentric.to_array();
+            PathStart { triangle, u, v, stream, wo, first: sample, end: sample + 1, padding: [0; 3] }
         };
         of.choice.samples[of.followed..].iter().map(start).collect()
     }
