@@ -50,6 +50,11 @@ impl Sampler {
         }
     }
 
+    /// Passes over a set of four dimensions, as if it had been drawn.
+    pub fn skip_4d(&mut self) {
+        (self.used, self.set) = (4, self.set + 1);
+    }
+
     /// The next dimension, in [0, 1).
     pub fn next_1d(&mut self) -> f32 {
         self.refill_for(1);
@@ -114,6 +119,14 @@ mod tests {
                 assert!(covariance.abs() < 5.0 / 12.0 / (N as f32).sqrt(), "columns {i}, {j}: covariance {covariance}");
             }
         }
+    }
+
+    #[test]
+    fn a_set_passed_over_is_a_set_drawn() {
+        let [mut drawn, mut skipped] = [Sampler::new(1, 3), Sampler::new(1, 3)];
+        drawn.next_2d();
+        skipped.skip_4d();
+        assert_eq!(drawn.next_4d(), skipped.next_4d());
     }
 
     #[test]
