@@ -198,7 +198,7 @@ fn no_darkness_leaks_from_under_a_box() {
     // Sunk into the floor, flush with it, and just above.
     for bottom in [-0.05, 0.0, 0.002] {
         let world = box_on_floor(bottom);
-        let map = bake(&world, &params(0.1, 256));
+        let map = bake(&world, &params(0.1, 1024));
         for i in 0..6 {
             let z = -0.2 + 0.08 * i as f32;
             for x in [-0.375, -0.39, 0.435, 0.45] {

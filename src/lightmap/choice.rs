@@ -34,7 +34,7 @@ impl Plan<'_> {
     /// Sample `i` of a texel: its place and the rest of its random numbers.
     pub(super) fn place(&self, pass: &Pass, texel: usize, back: bool, i: u32) -> (Point, Sampler) {
         let mut sampler = Sampler::new(self.stream(pass, texel, back), i);
-        (self.texels.point(&self.world.scene.geometry, &self.atlas, texel, sampler.next_2d()), sampler)
+        (self.texels.random_point(&self.world.scene.geometry, &self.atlas, texel, sampler.next_2d()), sampler)
     }
 
     /// The same, with the surface there.

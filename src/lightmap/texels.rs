@@ -102,11 +102,23 @@ impl Texels {
         let corners = geometry.corners(triangle).map(|p| chart.project(p));
         let width = atlas.size[0];
         let corner = Vec2::new((self.pixel[texel] % width) as f32, (self.pixel[texel] / width) as f32);
-        let v = Vec2::new((x / area).clamp(0.0, 1.0), u.y);
-        // Most texels lie within one triangle, which need not be cut.
-        let within = if area < WHOLE { Polygon::clip(corners.map(|c| c - corner)).point(v) } else { v };
-        let p = within + corner;
+        let polygon = Polygon::clip(corners.map(|c| c - corner));
+        let p = polygon.point(Vec2::new((x / area).clamp(0.0, 1.0), u.y)) + corner;
         Point { triangle, barycentric: barycentric(&corners, p) }
+    }
+
+    /// A point of texel `texel`'s covered part, uniformly by area as [`Texels::point`], of which it is another map: most texels lie within one
+    /// triangle, which this does not cut.
+    pub fn random_point(&self, geometry: &Geometry, atlas: &Atlas, texel: usize, u: Vec2) -> Point {
+        let &[(triangle, area)] = self.fragments_of(texel) else { return self.point(geometry, atlas, texel, u) };
+        if area < WHOLE {
+            return self.point(geometry, atlas, texel, u);
+        }
+        let chart = &atlas.charts[self.chart[texel] as usize];
+        let width = atlas.size[0];
+        let corner = Vec2::new((self.pixel[texel] % width) as f32, (self.pixel[texel] / width) as f32);
+        let barycentric = barycentric(&geometry.corners(triangle).map(|p| chart.project(p)), corner + u);
+        Point { triangle, barycentric }
     }
 }
 

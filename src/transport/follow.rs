@@ -115,24 +115,18 @@ impl OnCpu<'_> {
     /// One sample. Its first set of dimensions is for its place in its texel, which most have been given.
     fn sample(&self, (i, start): (usize, &PathStart), surface: &Surface, number: u32) -> Rgb {
         let mut sampler = Sampler::new(start.stream, number);
+        let mut offset = Vec2::ZERO;
+        match self.purpose {
+            Purpose::Irradiance | Purpose::Scattering(_, None) => sampler.skip_4d(),
+            Purpose::Openness(_) | Purpose::Scattering(_, Some(_)) => offset = sampler.next_2d(),
+        }
         match self.purpose {
             Purpose::Irradiance => {
-                sampler.skip_4d();
                 transmitted_irradiance(self.world, surface, start.wo[0] < 0.0, self.known, &self.params, &mut sampler)
             }
-            Purpose::Openness(distance) => {
-                sampler.next_2d();
-                openness(self.world, surface, start.wo[0] < 0.0, distance, &mut sampler)
-            }
+            Purpose::Openness(distance) => openness(self.world, surface, start.wo[0] < 0.0, distance, &mut sampler),
             Purpose::Scattering(query, elsewhere) => {
-                let own = (*surface, start.wo.into());
-                let (surface, wo) = match elsewhere {
-                    Some(elsewhere) => elsewhere(i, sampler.next_2d()).unwrap_or(own),
-                    None => {
-                        sampler.skip_4d();
-                        own
-                    }
-                };
+                let (surface, wo) = elsewhere.and_then(|elsewhere| elsewhere(i, offset)).unwrap_or((*surface, start.wo.into()));
                 scattered(self.world, &surface, wo, query, self.known, &self.params, &mut sampler)
             }
         }
