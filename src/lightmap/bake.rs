@@ -6,12 +6,11 @@
 //! of the second read diffuse light from its map, one bounce away, where the mean over many texels hides their noise.
 
 use super::denoise::DenoiseParams;
-use super::finish::Side;
-use super::parts::{Record, Store};
+use super::parts::Store;
 use super::solid::{Orientation, solids};
 use super::texels::Texels;
-use super::visible::{Visibility, facing};
-use super::{Atlas, AtlasParams, LightMap, lookup};
+use super::visible::{Sight, Visibility, facing};
+use super::{Atlas, AtlasParams, LightMap};
 use crate::base::math::{Rgb, hash_words};
 use crate::base::named::{Parameters, within};
 use crate::base::progress::Progress;
@@ -104,6 +103,8 @@ pub struct Baked {
     pub front: Vec<Rgb>,
     /// Behind, where any back is lit.
     pub back: Option<Vec<Rgb>>,
+    /// Samples that count, of a texel side on average.
+    pub samples: f64,
 }
 
 /// A bake that is ready to start: what is sampled where.
@@ -133,21 +134,21 @@ pub struct Pass<'a> {
     /// Where they are followed; `None` for the CPU.
     device: Option<&'a dyn Follow>,
     /// How the noise is taken out of the finished texels, if it is.
-    denoise: Option<DenoiseParams>,
+    pub(super) denoise: Option<DenoiseParams>,
 }
 
 /// What a first pass has found.
 pub struct First {
     /// Its map, from which paths of the second read diffuse light.
     pub map: LightMap,
-    /// Of each pixel's front and back.
-    flags: Vec<[u32; 2]>,
+    /// What each pixel's front and back see, where that is the same for all of their samples.
+    pub(super) sights: Vec<[Option<Sight>; 2]>,
 }
 
 impl First {
-    /// The flags of a pixel's side.
-    pub(super) fn flags(&self, pixel: u32, back: bool) -> u32 {
-        self.flags[pixel as usize][usize::from(back)]
+    /// What all samples of a pixel's side see; `None` where it is not the same.
+    pub(super) fn sight(&self, pixel: u32, back: bool) -> Option<Sight> {
+        self.sights[pixel as usize][usize::from(back)]
     }
 }
 
@@ -223,7 +224,7 @@ impl<'a> Plan<'a> {
         self.items.len().div_ceil(BLOCK) as u32
     }
 
-    fn block(&self, block: u32) -> &[(u32, bool)] {
+    pub(super) fn block(&self, block: u32) -> &[(u32, bool)] {
         self.items.chunks(BLOCK).nth(block as usize).unwrap_or_default()
     }
 
@@ -263,54 +264,6 @@ impl<'a> Plan<'a> {
     /// Whether `store` has a finished block.
     pub fn has(&self, store: &dyn Store, block: u32) -> bool {
         store.has(block, self.block(block).len())
-    }
-
-    /// A pass's finished map, ready for lookups.
-    pub fn map(&self, pass: &Pass, store: &dyn Store, progress: &dyn Progress) -> Result<LightMap> {
-        let Baked { front, back } = self.assemble(pass, store, progress)?;
-        Ok(lookup::sides(&self.world.scene.geometry, &self.atlas, front, back))
-    }
-
-    /// A finished first pass.
-    pub fn first(&self, pass: &Pass, store: &dyn Store, progress: &dyn Progress) -> Result<First> {
-        let mut flags = vec![[0; 2]; (self.atlas.size[0] * self.atlas.size[1]) as usize];
-        for (&(texel, back), record) in self.items.iter().zip(self.records(store)?) {
-            flags[self.texels.pixel[texel as usize] as usize][usize::from(back)] = record[3];
-        }
-        Ok(First { map: self.map(pass, store, progress)?, flags })
-    }
-
-    /// Samples that count, of a texel side on average, once all blocks are there.
-    pub fn mean_samples(&self, store: &dyn Store) -> Result<f64> {
-        let records = self.records(store)?;
-        Ok(records.iter().map(|r| f64::from(r[6])).sum::<f64>() / records.len().max(1) as f64)
-    }
-
-    /// Puts a pass's blocks together: noise, where it shall go; gutters, texels that nobody sees, seams.
-    pub fn assemble(&self, pass: &Pass, store: &dyn Store, progress: &dyn Progress) -> Result<Baked> {
-        let mut records = self.records(store)?;
-        if let Some(params) = &pass.denoise {
-            self.denoise(pass, &mut records, params, progress);
-        }
-        let mut sides = [Side::new(self), Side::new(self)];
-        for (&(texel, back), r) in self.items.iter().zip(&records) {
-            let side = &mut sides[back as usize];
-            let pixel = self.texels.pixel[texel as usize] as usize;
-            side.pixels[pixel] = Rgb::from_array([r[0], r[1], r[2]].map(f32::from_bits));
-            side.flags[pixel] = r[3];
-        }
-        let [front, back] = sides;
-        let has_back = self.backs() > 0;
-        Ok(Baked { front: self.finish(front, false), back: has_back.then(|| self.finish(back, true)) })
-    }
-
-    fn records(&self, store: &dyn Store) -> Result<Vec<Record>> {
-        let mut records = Vec::with_capacity(self.items.len());
-        for b in 0..self.blocks() {
-            let block = store.get(b, self.block(b).len());
-            records.extend(block.ok_or_else(|| Error::Request(format!("block {b} of the light map is missing: bake it again")))?);
-        }
-        Ok(records)
     }
 
     pub(super) fn visibility(&self) -> Visibility<'_> {

@@ -164,7 +164,7 @@ fn texels_take_the_samples_that_their_error_asks_for() {
         let (plan, store) = (Plan::new(&world, &params, 1).unwrap(), Memory::default());
         let pass = plan.second_pass(None);
         plan.run(&pass, &store, None, &Silent, || Ok(())).unwrap();
-        (plan.map(&pass, &store, &Silent).unwrap(), plan.mean_samples(&store).unwrap())
+        (plan.map(&pass, &store, &Silent).unwrap(), plan.assemble(&pass, &store, &Silent).unwrap().samples)
     };
     let (reference, _) = bake(None, 8192);
     // Root mean square, over texels, of what is off beside what is allowed.

@@ -1,6 +1,6 @@
 //! Which samples of a texel count (see [`crate::lightmap::visible`]), and the regions that they fall into.
 
-use super::bake::{CONTACT, FIRST_SAMPLES, OPEN, PART, Pass, Plan};
+use super::bake::{FIRST_SAMPLES, Pass, Plan};
 use super::texels::Point;
 use super::visible::Sight;
 use crate::base::math::{Rgb, hash_words};
@@ -54,48 +54,37 @@ impl Plan<'_> {
     }
 
     /// The first `count` samples of a texel that count.
-    pub(super) fn choose(&self, pass: &Pass, (texel, back): (u32, bool), count: u32) -> Choice {
-        let (visibility, texel) = (self.visibility(), texel as usize);
-        let samples = || (0..count).map(|i| (i, 0)).collect();
+    pub(super) fn choose(&self, pass: &Pass, item: (u32, bool), count: u32) -> Choice {
+        let ((texel, back), visibility) = (item, self.visibility());
         // What a first pass has found to be of one kind is not asked again.
-        if let Some(first) = pass.known {
-            let flags = first.flags(self.texels.pixel[texel], back);
-            let view = [(OPEN, Sight::Open), (CONTACT, Sight::Contact)].into_iter().find(|(flag, _)| flags & flag != 0);
-            match view {
-                None => return Choice { view: Sight::Inside, in_part: false, regions: Vec::new(), samples: Vec::new() },
-                Some((_, view)) if flags & PART == 0 => {
-                    let regions = vec![self.draw(pass, texel, back, 0).0];
-                    return Choice { view, in_part: false, regions, samples: samples() };
-                }
-                _ => {}
-            }
+        if let Some(view) = pass.known.and_then(|first| first.sight(self.texels.pixel[texel as usize], back)) {
+            return self.all_alike(pass, item, view, count);
         }
-        let first: Vec<_> = (0..FIRST_SAMPLES).map(|i| self.draw(pass, texel, back, i)).collect();
+        let first: Vec<_> = (0..FIRST_SAMPLES).map(|i| self.draw(pass, texel as usize, back, i)).collect();
         let views: Vec<Sight> = first.iter().map(|(s, sampler)| visibility.view(s, back, &mut sampler.clone())).collect();
         let best = views.iter().max().copied().unwrap_or(Sight::Inside);
-        if best == Sight::Inside {
-            return Choice { view: best, in_part: false, regions: Vec::new(), samples: Vec::new() };
-        }
-        let plain = views.iter().all(|&v| v == best)
-            && (best == Sight::Contact || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
-        if !plain {
-            return self.choose_in_part(pass, (texel, back), best, count);
-        }
-        Choice { view: best, in_part: false, regions: vec![first[0].0], samples: samples() }
+        let alike = views.iter().all(|&v| v == best)
+            && (best != Sight::Open || first[1..].iter().all(|(s, _)| visibility.together(&first[0].0, s, back)));
+        if alike { self.all_alike(pass, item, best, count) } else { self.choose_in_part(pass, item, best, count) }
     }
 
     /// As many of them as `count`, of which `choice` has the first.
-    pub(super) fn choose_more(&self, pass: &Pass, (texel, back): (u32, bool), choice: &Choice, count: u32) -> Choice {
-        if choice.in_part {
-            return self.choose_in_part(pass, (texel as usize, back), choice.view, count);
-        }
-        let samples = if choice.regions.is_empty() { Vec::new() } else { (0..count).map(|i| (i, 0)).collect() };
-        Choice { samples, regions: choice.regions.clone(), ..*choice }
+    pub(super) fn choose_more(&self, pass: &Pass, item: (u32, bool), choice: &Choice, count: u32) -> Choice {
+        let choose = if choice.in_part { Self::choose_in_part } else { Self::all_alike };
+        choose(self, pass, item, choice.view, count)
+    }
+
+    /// The samples of a texel of one region, all of which see the same.
+    fn all_alike(&self, pass: &Pass, (texel, back): (u32, bool), view: Sight, count: u32) -> Choice {
+        let counts = view != Sight::Inside;
+        let regions = counts.then(|| self.draw(pass, texel as usize, back, 0).0).into_iter().collect();
+        let samples = (0..if counts { count } else { 0 }).map(|i| (i, 0)).collect();
+        Choice { view, in_part: false, regions, samples }
     }
 
     /// The samples of a texel of which some are hidden, or lie in several regions.
-    fn choose_in_part(&self, pass: &Pass, (texel, back): (usize, bool), wanted: Sight, count: u32) -> Choice {
-        let visibility = self.visibility();
+    fn choose_in_part(&self, pass: &Pass, (texel, back): (u32, bool), wanted: Sight, count: u32) -> Choice {
+        let (visibility, texel) = (self.visibility(), texel as usize);
         let (mut regions, mut samples): (Vec<Surface>, _) = (Vec::new(), Vec::new());
         for i in 0..count.saturating_mul(TRIES).max(FIRST_SAMPLES) {
             let (surface, mut sampler) = self.draw(pass, texel, back, i);

@@ -13,11 +13,11 @@ use rayon::prelude::*;
 
 /// Light of a region's samples.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Sum {
-    pub paths: PathSum,
-    pub count: u32,
+struct Sum {
+    paths: PathSum,
+    count: u32,
     /// Number of the first sample.
-    pub first: u32,
+    first: u32,
 }
 
 impl Sum {
@@ -44,7 +44,7 @@ impl Sum {
 }
 
 /// The samples of a texel that count, and the light of those that were followed.
-pub(super) struct Gathered {
+struct Gathered {
     choice: Choice,
     /// Of each region.
     sums: Vec<Sum>,
@@ -70,10 +70,13 @@ impl Plan<'_> {
         let mut texels: Vec<Gathered> = items.par_iter().map(begin).collect();
         if let Some(error) = pass.error {
             self.gather(device, pass, items, &mut texels, &Silent)?;
-            let brightest = |texel: &Gathered| texel.sums.iter().filter(|s| s.is_lit()).max_by_key(|s| s.count).copied();
-            let light: Vec<Option<Sum>> = texels.iter().map(brightest).collect();
-            let counts = self.samples_for(error, pass.spp, items, &light);
-            texels.par_iter_mut().zip(items).zip(counts).for_each(|((texel, &item), count)| {
+            let largest_lit = |texel: &Gathered| {
+                let sum = texel.sums.iter().filter(|s| s.is_lit()).max_by_key(|s| s.count)?;
+                Some((sum.paths, sum.count))
+            };
+            let counts = self.samples_for(error, pass.spp, items, &texels.iter().map(largest_lit).collect::<Vec<_>>());
+            let more = texels.par_iter_mut().zip(items).zip(counts).filter(|(_, count)| *count > first);
+            more.for_each(|((texel, &item), count)| {
                 texel.choice = self.choose_more(pass, item, &texel.choice, count);
                 texel.sums.resize(texel.choice.regions.len(), Sum::default());
             });

@@ -98,10 +98,7 @@ impl Texels {
             x -= f.1;
         }
         let (triangle, area) = chosen;
-        let chart = &atlas.charts[self.chart[texel] as usize];
-        let corners = geometry.corners(triangle).map(|p| chart.project(p));
-        let width = atlas.size[0];
-        let corner = Vec2::new((self.pixel[texel] % width) as f32, (self.pixel[texel] / width) as f32);
+        let (corners, corner) = self.placed(geometry, atlas, texel, triangle);
         let polygon = Polygon::clip(corners.map(|c| c - corner));
         let p = polygon.point(Vec2::new((x / area).clamp(0.0, 1.0), u.y)) + corner;
         Point { triangle, barycentric: barycentric(&corners, p) }
@@ -114,11 +111,15 @@ impl Texels {
         if area < WHOLE {
             return self.point(geometry, atlas, texel, u);
         }
-        let chart = &atlas.charts[self.chart[texel] as usize];
-        let width = atlas.size[0];
-        let corner = Vec2::new((self.pixel[texel] % width) as f32, (self.pixel[texel] / width) as f32);
-        let barycentric = barycentric(&geometry.corners(triangle).map(|p| chart.project(p)), corner + u);
-        Point { triangle, barycentric }
+        let (corners, corner) = self.placed(geometry, atlas, texel, triangle);
+        Point { triangle, barycentric: barycentric(&corners, corner + u) }
+    }
+
+    /// A triangle's corners in the atlas, and that of a texel.
+    fn placed(&self, geometry: &Geometry, atlas: &Atlas, texel: usize, triangle: u32) -> ([Vec2; 3], Vec2) {
+        let (chart, pixel, width) = (&atlas.charts[self.chart[texel] as usize], self.pixel[texel], atlas.size[0]);
+        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        (geometry.corners(triangle).map(|p| chart.project(p)), corner)
     }
 }
 

@@ -66,6 +66,7 @@ mod tests {
         let deviation = w * ((4.0 / 6.0 - 4.0 / 9.0) / (SIZE[0] * SIZE[1]) as f64).sqrt();
         assert!((found - expected).abs() < 4.0 * deviation, "{found} in place of {expected} ± {deviation}");
     }
+
     /// Errors whose change is known, against references whose noise is larger than that.
     #[test]
     fn the_noise_of_the_references_goes() {

@@ -64,6 +64,24 @@ impl PathSum {
     }
 }
 
+/// Samples, from `least` to `most`, that bring a standard error down to `error` of the mean luminance and `floor`, by the variance of some that
+/// were drawn: `sums` are those of starts that are taken to be alike, and how many samples each is of.
+pub fn samples_to_error(error: f32, floor: f32, [least, most]: [u32; 2], sums: impl Iterator<Item = (PathSum, u32)>) -> u32 {
+    let (mut squares, mut degrees, mut sum, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for (of, n) in sums {
+        let n = f64::from(n);
+        squares += (of.squares - of.luminance * of.luminance / n).max(0.0);
+        degrees += n - 1.0;
+        sum += of.luminance;
+        count += n;
+    }
+    if degrees == 0.0 {
+        return least;
+    }
+    let allowed = f64::from(error) * (sum / count + f64::from(floor));
+    ((squares / degrees / (allowed * allowed)).ceil() as u32).clamp(least, most)
+}
+
 impl std::ops::Add for PathSum {
     type Output = Self;
 
@@ -151,5 +169,27 @@ impl Follow for OnCpu<'_> {
             sum
         };
         Ok(starts.par_iter().enumerate().map(sum).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_samples_is_the_variance_over_the_square_of_what_is_allowed() {
+        // Eight samples of 1 and eight of 2, in a texel and in one beside it.
+        let texel = (PathSum { luminance: 24.0, squares: 40.0, ..PathSum::default() }, 16);
+        let (least, floor) = (16, 0.03);
+        let (variance, allowed) = (4.0 / 15.0, 0.02 * (1.5 + f64::from(floor)));
+        let expected = (variance / (allowed * allowed)).ceil() as u32;
+        let samples =
+            |error, most, around: &[(PathSum, u32)]| samples_to_error(error, floor, [least, most], around.iter().copied());
+        for around in [vec![texel], vec![texel, texel]] {
+            assert!(samples(0.02, 1 << 20, &around).abs_diff(expected) <= 1, "in place of {expected}");
+        }
+        assert_eq!(samples(0.02, 100, &[texel]), 100, "no more than the most");
+        assert_eq!(samples(1e3, 100, &[texel]), least);
+        assert_eq!(samples(0.02, 100, &[]), least, "nothing is lit");
     }
 }

@@ -12,7 +12,7 @@ use crate::material::bsdf::{Lobes, Query};
 use crate::probe::file::{NO_TRIANGLE, Probe, Texel};
 use crate::probe::parameter_map::ParameterMap;
 use crate::transport::World;
-use crate::transport::follow::{Elsewhere, Follow, OnCpu, PathStart, PathSum, Purpose};
+use crate::transport::follow::{Elsewhere, Follow, OnCpu, PathStart, PathSum, Purpose, samples_to_error};
 use crate::transport::path::{KnownDiffuse, PathParams};
 use crate::view::gbuffer::is_glossy;
 use crate::view::mirror::mirror_hit;
@@ -310,20 +310,8 @@ impl Rows<'_> {
 fn paths_for(error: f32, most: u32, pilot: &[Option<Sums>], i: u32, width: u32) -> u32 {
     let height = pilot.len() as u32 / width;
     let (x, y) = (i % width, i / width);
-    let (mut squares, mut degrees, mut sum, mut paths) = (0.0, 0.0, 0.0, 0.0);
-    for row in y.saturating_sub(1)..=(y + 1).min(height - 1) {
-        for column in [(x + width - 1) % width, x, (x + 1) % width] {
-            let Some(s) = &pilot[(row * width + column) as usize] else { continue };
-            let n = f64::from(s.paths);
-            squares += (s.of.squares - s.of.luminance * s.of.luminance / n).max(0.0);
-            degrees += n - 1.0;
-            sum += s.of.luminance;
-            paths += n;
-        }
-    }
-    if degrees == 0.0 {
-        return most;
-    }
-    let allowed = f64::from(error) * (sum / paths + f64::from(ERROR_FLOOR));
-    ((squares / degrees / (allowed * allowed)).ceil() as u32).clamp(PILOT.min(most), most)
+    let columns = [(x + width - 1) % width, x, (x + 1) % width];
+    let texels = (y.saturating_sub(1)..=(y + 1).min(height - 1)).flat_map(|row| columns.map(|column| row * width + column));
+    let around = texels.filter_map(|texel| pilot[texel as usize].map(|sums| (sums.of, sums.paths)));
+    samples_to_error(error, ERROR_FLOOR, [PILOT.min(most), most], around)
 }

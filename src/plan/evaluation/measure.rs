@@ -39,40 +39,40 @@ pub struct Measured {
 
 /// The layers that the references have, glossy first.
 pub fn layers(subjects: &Subjects) -> Result<Vec<&'static str>> {
-    let mut layers = vec!["glossy", "full"];
-    for (i, folder) in subjects.references.iter().enumerate() {
-        for &frame in subjects.frames {
-            let path = folder.join(file(frame));
-            if !path.is_file() {
-                let count = subjects.frames.len();
-                let message = format!("no such file; the reference needs every frame that is evaluated ({count})");
-                return Err(Error::input(&path, message));
-            }
-        }
-        let path = folder.join(file(subjects.frames[0]));
-        let image = ExrImage::read(&path)?;
-        let [w, h] = subjects.size;
-        if [image.width, image.height] != [w as usize, h as usize] {
-            let message = format!("has {} x {} pixels, the frames {w} x {h}: give --size", image.width, image.height);
-            return Err(Error::input(&path, message));
-        }
-        let has = |layer: &&str| image.rgb(&path, if *layer == "full" { "" } else { layer }).is_ok();
-        match i {
-            0 => layers.retain(has),
-            _ => {
-                // One that has the first one's noise, or lacks a layer, is refused before hours of work.
-                let first = subjects.references[0].join(file(subjects.frames[0]));
-                for layer in &layers {
-                    let [reference, _] = read_pair(&first, &first, layer)?;
-                    read_second((&first, &reference), &path, layer)?;
-                }
-            }
-        }
-        if layers.is_empty() {
-            return Err(Error::input(&path, "found neither R, G, B nor glossy.R, glossy.G, glossy.B"));
+    let (first, image) = first_frame(subjects, &subjects.references[0])?;
+    let has = |layer: &&str| image.rgb(&first, if *layer == "full" { "" } else { layer }).is_ok();
+    let layers: Vec<_> = ["glossy", "full"].into_iter().filter(has).collect();
+    if layers.is_empty() {
+        return Err(Error::input(&first, "found neither R, G, B nor glossy.R, glossy.G, glossy.B"));
+    }
+    // A second one that has the first one's noise, or lacks a layer, is refused before hours of work.
+    for folder in &subjects.references[1..] {
+        let (second, _) = first_frame(subjects, folder)?;
+        for layer in &layers {
+            let [reference, _] = read_pair(&first, &first, layer)?;
+            read_second((&first, &reference), &second, layer)?;
         }
     }
     Ok(layers)
+}
+
+/// The first frame of a reference that has all of them, in the frames' size.
+fn first_frame(subjects: &Subjects, folder: &Path) -> Result<(PathBuf, ExrImage)> {
+    for &frame in subjects.frames {
+        let path = folder.join(file(frame));
+        if !path.is_file() {
+            let message = format!("no such file; the reference needs every frame that is evaluated ({})", subjects.frames.len());
+            return Err(Error::input(&path, message));
+        }
+    }
+    let path = folder.join(file(subjects.frames[0]));
+    let image = ExrImage::read(&path)?;
+    let [w, h] = subjects.size;
+    if [image.width, image.height] != [w as usize, h as usize] {
+        let message = format!("has {} x {} pixels, the frames {w} x {h}: give --size", image.width, image.height);
+        return Err(Error::input(&path, message));
+    }
+    Ok((path, image))
 }
 
 /// `NNNN.exr`.

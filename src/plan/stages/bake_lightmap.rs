@@ -129,8 +129,8 @@ impl BakeLightmap {
         let pass = plan.second_pass(first.as_ref()).on(device);
         let mut samples = f64::from(params.spp);
         let done = plan.run(&pass, store, self.shard, cx.progress(), || {
-            samples = plan.mean_samples(store)?;
             let baked = plan.assemble(&pass, store, cx.progress())?;
+            samples = baked.samples;
             let encode = if plan.is_light() { lookup::encode } else { lookup::encode_openness };
             let image = encode(&world.scene.geometry, &plan.atlas, &baked.front, baked.back.as_deref(), provenance.clone());
             image.write(&self.output)?;
