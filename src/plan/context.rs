@@ -125,7 +125,8 @@ impl Context {
         warn_of_bakes(&scene, &*self.listener);
         let clock = seconds();
         let (world, left_out) = World::opaque(scene);
-        self.listener.detail(&format!("tree for rays built in {:.2} s", clock()));
+        let world = world.with_outlook();
+        self.listener.detail(&format!("ready for rays in {:.2} s", clock()));
         if left_out > 0 {
             let message = format!("{left_out} transmissive shapes are left out: probes and light maps hold opaque surfaces");
             self.listener.warn(&message);

@@ -99,6 +99,15 @@ impl Envmap {
         ((self.world_from_local * direction_from_lat_long(uv)).normalize_or(Vec3::Y), pdf, self.radiance(&place))
     }
 
+    /// The numbers with which [`Envmap::sample`] finds the direction `d`.
+    pub fn numbers(&self, d: Vec3) -> Vec2 {
+        let place = self.place(self.lat_long(d));
+        let [[a, b], [c, d]] = self.corners(&place);
+        let Vec2 { x: tx, y: ty } = place.at;
+        let x = self.columns[place.y[0]].at(place.x[0], linear_share(tx, a + (c - a) * ty, b + (d - b) * ty));
+        Vec2::new(x, self.rows.at(place.y[0], linear_share(ty, a + b, c + d)))
+    }
+
     /// Tells the caches what [`Envmap::sample`] will read of its distribution.
     pub fn prefetch(&self, v: Vec2) {
         let (y, _) = self.rows.pick(v.y);
@@ -168,6 +177,11 @@ fn sample_linear(u: f32, a: f32, b: f32) -> f32 {
     }
     let root = (a * a + (b * b - a * a) * u).max(0.0).sqrt();
     (u * (a + b) / (a + root).max(f32::MIN_POSITIVE)).min(1.0)
+}
+
+/// The number with which [`sample_linear`] finds `t`.
+fn linear_share(t: f32, a: f32, b: f32) -> f32 {
+    if a + b <= 0.0 { t } else { t * (2.0 * a + (b - a) * t) / (a + b) }
 }
 
 #[cfg(test)]
@@ -249,6 +263,19 @@ mod tests {
         for (bin, (&e, &f)) in expected.iter().zip(&found).enumerate() {
             let sigma = (e * (1.0 - e) / f64::from(N)).sqrt();
             assert!((e - f).abs() < 4.0 * sigma + 1e-3 * e + 1e-5, "bin {bin}: expected {e}, found {f}");
+        }
+    }
+
+    #[test]
+    fn directions_are_found_by_their_numbers() {
+        let map = test_map();
+        for i in 0..4096 {
+            let v = Sampler::new(4, i).next_2d();
+            let (d, pdf, _) = map.sample(v);
+            let back = map.numbers(d);
+            // Where little is drawn, a number is a large step of direction.
+            let (again, _, _) = map.sample(back);
+            assert!(back.distance(v) < 2e-3 || again.distance(d) < 1e-3, "{v} gives {d} (density {pdf}), which has {back}");
         }
     }
 

@@ -9,6 +9,7 @@ use super::envmap::Envmap;
 use super::light_sample::LightSample;
 use super::light_tree::{LightBounds, LightTree, Receiver};
 use super::light_triangle::{LightTriangle, is_parallelogram};
+use super::outlook::Outlook;
 use super::round_light;
 use super::sun::Sun;
 use crate::base::math::{Rgb, luminance};
@@ -16,6 +17,7 @@ use crate::material::Surface;
 use crate::scene::{Emitter, Scene};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 /// Sampling distributions of a scene's emitters.
 #[derive(Debug, Default)]
@@ -26,6 +28,8 @@ pub struct Lights {
     /// For each of `Scene::emitters`: the first of its triangles in `near`; `None` for those that are no area lights.
     pub(crate) first: Vec<Option<u32>>,
     pub(crate) environments: Vec<Environment>,
+    /// What is seen of them from where, once that is known.
+    pub(crate) outlook: Option<Arc<Outlook>>,
     /// Directional emitters: indices into `Scene::emitters`.
     pub(crate) suns: Vec<u32>,
     /// Whether no ray can meet light: there is neither an area light that is not dark, nor an environment.
@@ -107,6 +111,13 @@ impl Lights {
         this
     }
 
+    /// Those of a frame's scene. What these know of the sky goes on being of use: whatever has moved, each part has a share.
+    pub(super) fn of(&self, scene: &Scene) -> Self {
+        let lights = Self::new(scene);
+        let outlook = self.outlook.clone().filter(|outlook| outlook.environments == lights.environments.len());
+        Self { outlook, ..lights }
+    }
+
     /// Whether nothing emits.
     pub fn is_empty(&self) -> bool {
         self.shares() == 0
@@ -137,8 +148,11 @@ impl Lights {
         }
     }
 
-    /// The image that `u` chooses.
+    /// The image that `u` chooses, where what is read of it does not depend on the receiver.
     fn map(&self, u: f32) -> Option<&Envmap> {
+        if self.outlook.is_some() {
+            return None;
+        }
         match self.environments.get((u * self.shares() as f32) as usize)? {
             Environment::Map(map) => Some(map),
             _ => None,
@@ -151,7 +165,7 @@ impl Lights {
         let place = u * shares as f32;
         let choice = (place as usize).min(shares.checked_sub(1)?);
         if choice < self.environments.len() {
-            return self.sample_environment(choice, v);
+            return self.sample_environment(choice, receiver, v);
         }
         if let Some(&sun) = self.suns.get(choice - self.environments.len()) {
             let mut sample = sample_delta(&scene.emitters[sun as usize], receiver.p)?;
@@ -177,12 +191,13 @@ impl Lights {
         }
     }
 
-    fn sample_environment(&self, index: usize, v: Vec2) -> Option<LightSample> {
+    fn sample_environment(&self, index: usize, receiver: &Receiver, v: Vec2) -> Option<LightSample> {
+        let (v, density) = self.outlook.as_ref().map_or((v, 1.0), |outlook| outlook.draw(index, receiver, v));
         let (wi, mut pdf, mut radiance) = self.environments[index].sample(v);
+        pdf *= self.share() * density;
         if self.environments.len() > 1 {
-            (pdf, radiance) = (self.environments.iter().map(|e| e.pdf(wi)).sum(), self.environment(wi));
+            (pdf, radiance) = (self.pdf_environment(receiver, wi), self.environment(wi));
         }
-        pdf *= self.share();
         let sample = LightSample { wi, distance: f32::INFINITY, point: Vec3::ZERO, weight: radiance / pdf, pdf, delta: false };
         (pdf > 0.0).then_some(sample)
     }
@@ -207,8 +222,12 @@ impl Lights {
     }
 
     /// Density with which [`Lights::sample`] finds the environment in direction `d`.
-    pub fn pdf_environment(&self, d: Vec3) -> f32 {
-        self.share() * self.environments.iter().map(|e| e.pdf(d)).sum::<f32>()
+    pub fn pdf_environment(&self, receiver: &Receiver, d: Vec3) -> f32 {
+        let pdf = |(i, e): (usize, &Environment)| {
+            let density = self.outlook.as_ref().map_or(1.0, |outlook| outlook.density(i, receiver, || e.numbers(d)));
+            e.pdf(d) * density
+        };
+        self.share() * self.environments.iter().enumerate().map(pdf).sum::<f32>()
     }
 
     /// Radiance of the environment from direction `d` (pointing away from the scene).
@@ -239,7 +258,7 @@ impl Environment {
     }
 
     /// A direction, its density and the radiance from there.
-    fn sample(&self, v: Vec2) -> (Vec3, f32, Rgb) {
+    pub(super) fn sample(&self, v: Vec2) -> (Vec3, f32, Rgb) {
         match self {
             Self::Map(map) => map.sample(v),
             Self::Sun(sun) => sun.sample(v),
@@ -250,6 +269,20 @@ impl Environment {
                 (Vec3::new(r * cos_phi, r * sin_phi, z), 0.25 / PI, *radiance)
             }
         }
+    }
+
+    /// The numbers with which [`Environment::sample`] finds a direction.
+    fn numbers(&self, d: Vec3) -> Vec2 {
+        match self {
+            Self::Map(map) => map.numbers(d),
+            Self::Constant(_) => Vec2::new((d.y.atan2(d.x) / (2.0 * PI)).rem_euclid(1.0), 0.5 * (1.0 - d.z)),
+            Self::Sun(_) => Vec2::splat(0.5),
+        }
+    }
+
+    /// Whether it is large enough for parts of it to be seen, and [`Environment::numbers`] tells which.
+    pub(super) fn has_parts(&self) -> bool {
+        !matches!(self, Self::Sun(_))
     }
 
     fn pdf(&self, d: Vec3) -> f32 {
@@ -454,7 +487,10 @@ mod tests {
             assert_eq!(lights.emitted(&s, &found, -sample.wi), Rgb::new(1.0, 2.0, 3.0));
             assert_eq!(lights.emitted(&s, &found, sample.wi), Rgb::ZERO);
             let sky = lights.sample(&s, &receiver, 0.25, v).unwrap();
-            assert!((sky.pdf - 0.5 * 0.25 / PI).abs() < 1e-6 && (sky.pdf - lights.pdf_environment(sky.wi)).abs() < 1e-7);
+            assert!(
+                (sky.pdf - 0.5 * 0.25 / PI).abs() < 1e-6
+                    && (sky.pdf - lights.pdf_environment(&at([0.0; 3]), sky.wi)).abs() < 1e-7
+            );
         }
     }
 

@@ -16,12 +16,12 @@ pub(super) struct Found {
 }
 
 /// Radiance that a ray in direction `d` meets where it leaves the scene, and its weight against emitter sampling.
-pub(super) fn environment_met(world: &World, d: Vec3, found: Found) -> (Rgb, f32) {
+pub(super) fn environment_met(world: &World, d: Vec3, from: &Receiver, found: Found) -> (Rgb, f32) {
     let light = world.lights.environment(d);
     if light == Rgb::ZERO {
         return (light, 0.0);
     }
-    let other = if found.delta { 0.0 } else { world.lights.pdf_environment(d) };
+    let other = if found.delta { 0.0 } else { world.lights.pdf_environment(from, d) };
     (light, power_heuristic(found.pdf, other))
 }
 

@@ -260,7 +260,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
         let [light_x, light_y, light_choice, live] = sampler.next_4d();
         world.lights.prefetch(light_choice, Vec2::new(light_x, light_y));
         let Some(surface) = world.intersect(&ray) else {
-            let (light, weight) = environment_met(world, ray.d, found);
+            let (light, weight) = environment_met(world, ray.d, &from, found);
             return sum + throughput * light * weight;
         };
         world.lights.prefetch_radiance(light_choice, Vec2::new(light_x, light_y));

@@ -64,6 +64,11 @@ impl Steps {
         prefetch_at(&self.sums, last);
     }
 
+    /// The number that [`Steps::pick`] takes for an outcome and a place in its step.
+    pub fn at(&self, step: usize, rest: f32) -> f32 {
+        self.sums[step] + (self.sums[step + 1] - self.sums[step]) * rest
+    }
+
     /// The outcome that `u` in [0, 1) falls on, and where in its step, in [0, 1).
     pub fn pick(&self, u: f32) -> (usize, f32) {
         let [first, last] = self.bounds(u);

@@ -3,6 +3,7 @@
 use super::bvh::{BEAM, Bvh};
 use super::facet::Facet;
 use super::lights::Lights;
+use super::outlook::Outlook;
 use crate::base::math::Rgb;
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
@@ -65,8 +66,17 @@ impl World {
         let added = (all.triangles.len() as u32 > first)
             .then(|| Box::new(Added { bvh: self.bvh.beside(&scene, first), facets: facets(&scene, first) }));
         let relit = own.objects.iter().zip(&all.objects).any(|(a, b)| a.emitter != b.emitter);
-        let lights = if animation.changes_light() { Lights::new(&scene).into() } else { self.lights.clone() };
+        let lights = if animation.changes_light() { self.lights.of(&scene).into() } else { self.lights.clone() };
         Self { scene, bvh: self.bvh.clone(), lights, facets: self.facets.clone(), added, relit }
+    }
+
+    /// The same world, whose paths draw little of its environment but what is seen from where they are.
+    pub fn with_outlook(mut self) -> Self {
+        let outlook = Outlook::new(&self).map(Arc::new);
+        if let Some(lights) = Arc::get_mut(&mut self.lights) {
+            lights.outlook = outlook;
+        }
+        self
     }
 
     /// First hit of a ray.

@@ -292,7 +292,7 @@ impl RenderPath {
     fn inputs(&self, cx: &Context, (method, joined): (&Method, Option<&Joined>), timings: &mut Timings) -> Result<Inputs> {
         let world = if method.transmissive {
             let (scene, load_ms) = timed(|| cx.load_scene(&self.scene));
-            let (world, build_ms) = timed(|| scene.map(World::new));
+            let (world, build_ms) = timed(|| scene.map(|scene| World::new(scene).with_outlook()));
             (timings.load_ms, timings.build_ms) = (load_ms, build_ms);
             Arc::new(world?)
         } else {

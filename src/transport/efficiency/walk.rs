@@ -170,7 +170,7 @@ impl Walk<'_> {
         let world = self.world;
         let numbers = self.emitter_numbers(sampler);
         let Some(s) = world.intersect(ray) else {
-            let (light, weight) = environment_met(world, ray.d, found);
+            let (light, weight) = environment_met(world, ray.d, from, found);
             return Estimate { light: light * weight, cost: 0.0 };
         };
         let wo = -ray.d;
