@@ -159,7 +159,7 @@ fn wrong_requests_are_refused_before_anything_is_baked() {
     assert!(text.contains("bake-probes") && !text.contains("--for-path"), "ulr wants any texel: {text}");
     let text = dry("--methods all --reference-pair");
     for part in [
-        "--set rays.per_pixel=4 --output out/frames/glossy-probes-rays",
+        "--set rays.per_pixel=24 --output out/frames/glossy-probes-rays",
         "--output out/frames/path-trace-filter",
         "--output out/frames/many-light",
         "reprobe bake-transport",

@@ -197,7 +197,7 @@ fn rays_beside_probes_are_nearer_and_threads_do_not_change_a_bit() {
 
     figures(&f, &render("--set rays.per_pixel=4 --denoise=filter"));
     let message = f.refusal(&render("--denoise=filter"));
-    assert!(message.contains("--set rays.per_pixel=4"), "{message}");
+    assert!(message.contains("--set rays.per_pixel=24"), "{message}");
     let message = f.refusal(&render("--set rays.per_pixel=1"));
     assert!(message.contains("0, or 2 and more"), "{message}");
     let message = f.refusal(&render("--set rays.per_pixel=4").replace("--lightmap out/lightmap.exr", ""));

@@ -9,7 +9,7 @@ use crate::scene::Camera;
 use crate::transport::World;
 use crate::view::denoise::{DenoiseParams, GUIDE_SAMPLES, Guide, filter_layer, guides};
 use crate::view::layers::LayerImages;
-use crate::view::oidn::{self, Oidn, OidnParams};
+use crate::view::oidn::{self, Oidn, OidnParams, Quality};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -57,6 +57,14 @@ impl Denoiser {
         }
     }
 
+    /// The same at another quality; the filter has but one.
+    pub fn at(self, quality: Quality) -> Self {
+        match self {
+            Self::Filter(_) => self,
+            Self::Oidn { version, params } => Self::Oidn { version, params: OidnParams { quality, ..params } },
+        }
+    }
+
     /// That of a method's parameters; `None` where its frames are left as they are.
     pub fn among(parameters: &Value) -> Option<Self> {
         serde_json::from_value(parameters.get("denoise")?.clone()).ok()
@@ -87,7 +95,7 @@ impl Denoiser {
     pub fn denoise_layers<const N: usize>(&self, layers: [&[Rgb]; N], guides: &[Guide], width: usize) -> Result<[Vec<Rgb>; N]> {
         match self {
             Self::Filter(params) => Ok(layers.map(|layer| filter_layer(layer, guides, width, params))),
-            Self::Oidn { .. } => oidn::denoise_layers(layers, guides, width),
+            Self::Oidn { params, .. } => oidn::denoise_layers(layers, guides, width, params.quality),
         }
     }
 

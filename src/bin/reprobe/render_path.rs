@@ -18,7 +18,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   reprobe render-path room/scene.xml --path room/path.json --probes probes/ --lightmap lightmap.exr --curvature curvature.exr -o frames/
-  reprobe render-path room/scene.xml --path room/path.json --probes probes/ --lightmap lightmap.exr --curvature curvature.exr --set rays.per_pixel=4 --denoise -o joined/
+  reprobe render-path room/scene.xml --path room/path.json --probes probes/ --lightmap lightmap.exr --curvature curvature.exr --set rays.per_pixel=24 --denoise -o joined/
   reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 256 --shard 0/4 -o reference/
   reprobe render-path room/scene.xml --path room/path.json --method path-trace --spp 4 --denoise oidn -o denoised/
   reprobe render-path room/scene.xml --path room/path.json --method lightmap-rt --lightmap lightmap.exr --match-time frames/ -o rays/

@@ -3,9 +3,9 @@
 //!
 //! *Ours*. Probes have no noise, and are off where their texels are too coarse for a moulding or where no probe sees what a mirror shows; rays are
 //! right in the mean and noisy, less so with a denoiser. Which of the two is nearer need not be guessed from the gather's energy or the lobe's width: half of the rays
-//! tells it. For an estimate X that this half R has no part in, E[|X - R|²] is the squared error of X and the variance of R, which all estimates share. So, over a
-//! window, w X + (1 - w) P is nearest for w = Σ (X - P)·(R - P) / Σ |X - P|², with X from one half of the rays, P from the probes, and R the other half; and once
-//! more with the halves exchanged. No threshold chooses, so that there is no border to see.
+//! tells it. The rays' estimate is the mean M of what the halves say, each denoised by itself, and in a window w M + (1 - w) P, with P from the probes, is nearest to the
+//! truth T for w = Σ (M - P)·(T - P) / Σ |M - P|². In the mean, a half of the rays as it is, R, stands for T, with what the other half, which it has no part in,
+//! gives to M: Σ (M - P)·(T - P) = Σ ½ [(X₁ - P)·(R₂ - P) + (X₂ - P)·(R₁ - P)]. No threshold chooses, so that there is no border to see.
 //!
 //! In: a frame's glossy layer from probes, linear. Out: the same, joined.
 
@@ -29,11 +29,14 @@ use serde::{Deserialize, Serialize};
 const RAYS: u32 = 0x7261_7973;
 /// Most rays a pixel.
 const MOST_RAYS: u32 = 1 << 12;
+/// Rays that leave a surface for one that a camera ray has met, from so many rays a pixel on.
+const OF_ONE: u32 = 2;
+const MANY: u32 = 8;
 /// Luminance that is added to a pixel's before squares are divided by it, in units of the layer's geometric mean: what is darker counts as if it
 /// were so bright.
 const FLOOR: f32 = 0.2;
 /// What both estimates being as good is worth, in squares of differences relative to their sum.
-const PRIOR: f32 = 0.01;
+const PRIOR: f32 = 0.005;
 
 /// Rays of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -49,7 +52,7 @@ pub struct RaysParams {
 
 impl Default for RaysParams {
     fn default() -> Self {
-        Self { per_pixel: 0, bounces: 3, window: 8.0 }
+        Self { per_pixel: 0, bounces: 3, window: 4.0 }
     }
 }
 
@@ -87,70 +90,65 @@ pub fn joined(
 ) -> Result<Vec<Rgb>> {
     let width = shot.camera.size[0] as usize;
     let halves = halves(world, lightmap, shot, params);
-    let whole: Vec<Rgb> = halves[0].iter().zip(&halves[1]).map(|(a, b)| mean([*a, *b], params.per_pixel)).collect();
     clock.lap("rays");
     let estimates = match denoiser {
-        None => [halves[0].clone(), halves[1].clone(), whole],
+        None => halves.clone(),
         Some(denoiser) => {
             let [_, guides] = denoiser.guides(world, shot.camera, params.per_pixel, shot.seeds);
             clock.lap("guides");
-            let denoised = denoiser.denoise_layers([&halves[0], &halves[1], &whole], &guides, width)?;
+            let denoised = denoiser.denoise_layers([&halves[0], &halves[1]], &guides, width)?;
             clock.lap("denoise");
             denoised
         }
     };
     let weights = weights(probes, &halves, &estimates, (width, params.window));
-    let layer = probes.iter().zip(&estimates[2]).zip(weights).map(|((&p, &x), w)| p + (x - p) * w).collect();
+    let layer = (0..probes.len()).map(|i| probes[i] + (mean(&estimates, i) - probes[i]) * weights[i]).collect();
     clock.lap("join");
     Ok(layer)
 }
 
-/// How many of a pixel's rays are in each half.
-fn counts(rays: u32) -> [u32; 2] {
-    [rays.div_ceil(2), rays / 2]
+/// What both halves say of a pixel together.
+fn mean(estimates: &[Vec<Rgb>; 2], i: usize) -> Rgb {
+    0.5 * (estimates[0][i] + estimates[1][i])
 }
 
-/// The mean of all rays, from those of the halves.
-fn mean(halves: [Rgb; 2], rays: u32) -> Rgb {
-    let [a, b] = counts(rays).map(|n| n as f32 / rays as f32);
-    halves[0] * a + halves[1] * b
-}
-
-/// Means of the even and of the odd rays of each pixel.
+/// Means of each half of the rays of every pixel. Halves have no camera ray in common.
 fn halves(world: &World, lightmap: &LightMap, Shot { camera, seeds: [seed, frame] }: Shot, params: &RaysParams) -> [Vec<Rgb>; 2] {
     let [width, height] = camera.size;
     let path = PathParams::of_rays(params.bounces);
     let known = |s: &Surface, wo: Vec3| lightmap.diffuse_radiance(&world.scene, s, wo);
+    let rays = params.per_pixel;
+    let of_one = if rays < MANY { 1 } else { OF_ONE };
     let pixel = |i: u32| {
-        let stream = hash_words(&[seed, frame, RAYS, i]);
-        let mut sums = [Rgb::ZERO; 2];
-        for index in 0..params.per_pixel {
-            let mut sampler = Sampler::new(stream, index);
-            let ray = camera.drawn_ray(i, sampler.next_4d());
-            if let Some(surface) = world.seen(&ray).filter(|s| is_glossy(world, s, -ray.d)) {
-                sums[index as usize % 2] += scattered(world, &surface, -ray.d, GLOSSY, Some(&known), &path, &mut sampler);
+        let [to_pixel, from_surface] = [0, 1].map(|k| hash_words(&[seed, frame, RAYS, i, k]));
+        let mut sums = [(Rgb::ZERO, 0); 2];
+        for first in (0..rays).step_by(of_one as usize) {
+            let (sum, count) = &mut sums[(first / of_one) as usize % 2];
+            let these = first..rays.min(first + of_one);
+            *count += these.len();
+            let ray = camera.drawn_ray(i, Sampler::new(to_pixel, first / of_one).next_4d());
+            let Some(surface) = world.seen(&ray).filter(|s| is_glossy(world, s, -ray.d)) else { continue };
+            for number in these {
+                let mut sampler = Sampler::new(from_surface, number);
+                *sum += scattered(world, &surface, -ray.d, GLOSSY, Some(&known), &path, &mut sampler);
             }
         }
-        let [a, b] = counts(params.per_pixel).map(|n| 1.0 / n as f32);
-        (sums[0] * a, sums[1] * b)
+        let [a, b] = sums.map(|(sum, count)| sum / count as f32);
+        (a, b)
     };
-    let (even, odd) = (0..width * height).into_par_iter().with_min_len(width as usize).map(pixel).unzip();
-    [even, odd]
+    let (a, b) = (0..width * height).into_par_iter().with_min_len(width as usize).map(pixel).unzip();
+    [a, b]
 }
 
-/// What the rays' estimate weighs at each pixel, 0 to 1, by both halves: `estimates` holds that of each half, and of all rays.
-fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 3], (width, window): (usize, f32)) -> Vec<f32> {
+/// What the mean of the rays' estimates, one of each half, weighs at each pixel, 0 to 1.
+fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 2], (width, window): (usize, f32)) -> Vec<f32> {
     let lights = || probes.iter().map(|&c| luminance(c)).filter(|&y| y > 0.0);
     let floor = FLOOR * (lights().map(f32::ln).sum::<f32>() / lights().count().max(1) as f32).exp();
     let term = |i: usize| {
-        let scale = (luminance(probes[i]) + luminance(estimates[2][i]) + floor).powi(-2);
-        let (mut along, mut square) = (0.0, 0.0);
-        for (estimate, judge) in [(0, 1), (1, 0)] {
-            let apart = estimates[estimate][i] - probes[i];
-            along += apart.dot(halves[judge][i] - probes[i]);
-            square += apart.length_squared();
-        }
-        let term = Vec2::new(along, square) * scale;
+        let (p, m) = (probes[i], mean(estimates, i));
+        let scale = (luminance(p) + luminance(m) + floor).powi(-2);
+        let along = |of: usize, by: usize| (estimates[of][i] - p).dot(halves[by][i] - p);
+        let term = Vec2::new(along(0, 1) + along(1, 0), 2.0 * (m - p).length_squared()) * scale;
         if term.is_finite() { term } else { Vec2::ZERO }
     };
     let terms: Vec<Vec2> = (0..probes.len()).into_par_iter().with_min_len(width.max(1)).map(term).collect();
@@ -210,11 +208,10 @@ mod tests {
     fn noisy_rays_weigh_what_wiener_would_give_them_and_nothing_where_probes_are_right() {
         let bias = 0.3;
         let (probes, halves) = picture(bias);
-        let whole: Vec<Rgb> = halves[0].iter().zip(&halves[1]).map(|(a, b)| mean([*a, *b], 2)).collect();
-        let weights = weights(&probes, &halves, &[halves[0].clone(), halves[1].clone(), whole], (WIDTH, 8.0));
+        let weights = weights(&probes, &halves, &halves, (WIDTH, 8.0));
         let [left, right] = sides(&weights);
-        // Each half is an estimate with the noise of a half: b² / (b² + σ²).
-        let wiener = bias * bias / (bias * bias + NOISE * NOISE);
+        // The mean of both has half of a half's variance: b² / (b² + σ² / 2).
+        let wiener = bias * bias / (bias * bias + NOISE * NOISE / 2.0);
         assert!((left - wiener).abs() < 0.02, "{left}, not {wiener}");
         // 200 pixels a window: the weight's own noise is a tenth, cut off below 0.
         assert!(right < 0.1, "{right}");
@@ -225,7 +222,7 @@ mod tests {
         let bias = 0.3;
         let (probes, halves) = picture(bias);
         let clean = || vec![Rgb::ONE; COUNT];
-        let [left, right] = sides(&weights(&probes, &halves, &[clean(), clean(), clean()], (WIDTH, 8.0)));
+        let [left, right] = sides(&weights(&probes, &halves, &[clean(), clean()], (WIDTH, 8.0)));
         // All of it, but for what the prior holds back: squares of three channels and two halves, relative to the sum of both and the floor.
         let squares = 6.0 * bias * bias / (2.0 + bias + FLOOR * (1.0 + bias).sqrt()).powi(2);
         let expected = (squares + 0.5 * PRIOR) / (squares + PRIOR);
@@ -237,7 +234,7 @@ mod tests {
     fn what_is_no_number_does_not_spread() {
         let (mut probes, halves) = picture(0.3);
         probes[50 * WIDTH + 50] = Rgb::splat(f32::NAN);
-        let weights = weights(&probes, &halves, &[halves[0].clone(), halves[1].clone(), halves[0].clone()], (WIDTH, 8.0));
+        let weights = weights(&probes, &halves, &halves, (WIDTH, 8.0));
         assert!(weights.iter().all(|w| w.is_finite()));
     }
 

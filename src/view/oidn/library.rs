@@ -2,6 +2,7 @@
 //!
 //! In: pixels as its images have them. Out: a filtered image; the same on any number of threads.
 
+use super::Quality;
 use super::places::{DIR, FILE, places};
 use crate::{Error, Result};
 use glam::Vec3;
@@ -53,10 +54,22 @@ functions! {
     release_device = b"oidnReleaseDevice\0": fn(Handle);
     new_filter = b"oidnNewFilter\0": fn(Handle, *const c_char) -> Handle;
     set_image = b"oidnSetSharedFilterImage\0": fn(Handle, *const c_char, *mut c_void, c_int, usize, usize, usize, usize, usize);
+    set_int = b"oidnSetFilterInt\0": fn(Handle, *const c_char, c_int);
     set_bool = b"oidnSetFilterBool\0": fn(Handle, *const c_char, bool);
     commit_filter = b"oidnCommitFilter\0": fn(Handle);
     execute_filter = b"oidnExecuteFilter\0": fn(Handle);
     release_filter = b"oidnReleaseFilter\0": fn(Handle);
+}
+
+impl Quality {
+    /// `OIDN_QUALITY_*`.
+    fn number(self) -> c_int {
+        match self {
+            Self::Fast => 4,
+            Self::Balanced => 5,
+            Self::High => 6,
+        }
+    }
 }
 
 impl Oidn {
@@ -84,9 +97,9 @@ impl Oidn {
         Ok(oidn)
     }
 
-    /// The output of the filter "RT" from these images, all of one size and `width` pixels wide, and these settings, on as many threads as
-    /// the program has.
-    pub fn filtered(&self, images: &[(&CStr, &[Vec3])], settings: &[(&CStr, bool)], width: usize) -> Result<Vec<Vec3>> {
+    /// The output of the filter "RT" from these images, all of one size and `width` pixels wide, with these settings on, at a quality, on as
+    /// many threads as the program has.
+    pub fn filtered(&self, images: &[(&CStr, &[Vec3])], settings: &[&CStr], quality: Quality, width: usize) -> Result<Vec<Vec3>> {
         let pixels = images.first().map_or(0, |(_, pixels)| pixels.len());
         if pixels == 0 {
             return Ok(Vec::new());
@@ -101,7 +114,7 @@ impl Oidn {
         }
         // SAFETY: the same number of pixels, which nothing else reads or writes until the filter is released.
         unsafe { filter.set_image(c"output", output.as_mut_ptr(), [width, pixels / width]) };
-        filter.run(settings);
+        filter.run(settings, quality);
         drop(filter);
         device.check()?;
         Ok(output)
@@ -205,11 +218,13 @@ impl<'a> Filter<'a> {
         unsafe { (self.device.of.set_image)(self.handle, name.as_ptr(), pixels.cast(), FLOAT3, width, height, 0, 0, 0) };
     }
 
-    fn run(&self, settings: &[(&CStr, bool)]) {
-        for (name, on) in settings {
+    fn run(&self, settings: &[&CStr], quality: Quality) {
+        for name in settings {
             // SAFETY: a live filter, and a name that ends in zero.
-            unsafe { (self.device.of.set_bool)(self.handle, name.as_ptr(), *on) };
+            unsafe { (self.device.of.set_bool)(self.handle, name.as_ptr(), true) };
         }
+        // SAFETY: the same; versions that know fewer qualities take theirs.
+        unsafe { (self.device.of.set_int)(self.handle, c"quality".as_ptr(), quality.number()) };
         // SAFETY: a live filter, whose images live as long as it does, as `set_image` asks.
         unsafe { (self.device.of.commit_filter)(self.handle) };
         // SAFETY: the same; returns when the output is written.
