@@ -8,7 +8,7 @@ mod timing;
 use reprobe::method::glossy_probes::candidates::NearCandidates;
 use reprobe::method::glossy_probes::filter::FilterParams;
 use reprobe::method::glossy_probes::gather::{GatherParams, gather};
-use reprobe::method::glossy_probes::renderer::filter_pass;
+use reprobe::method::glossy_probes::whole::filter_pass;
 use reprobe::probe::store::ProbeStore;
 use reprobe::scene::Camera;
 use reprobe::surface::curvature_file;

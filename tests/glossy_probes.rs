@@ -10,14 +10,18 @@ use reprobe::lightmap::{Atlas, AtlasParams, DenoiseParams};
 use reprobe::method::glossy_probes::bake::{Bake, ProbeBakeParams, Traced, bake_glossy, probe_geometry};
 use reprobe::method::glossy_probes::candidates::{Candidates, WeightedProbe};
 use reprobe::method::glossy_probes::coverage::{CoverageParams, SubPixels, covered_pixels};
+use reprobe::method::glossy_probes::filter::FilterParams;
+use reprobe::method::glossy_probes::footprint::{Footprint, FootprintParams};
 use reprobe::method::glossy_probes::gather::{GatherParams, Gathered, SearchLevel, gather};
 use reprobe::method::glossy_probes::perturb::Order;
+use reprobe::method::glossy_probes::shown::shown;
+use reprobe::method::glossy_probes::tiles::{Room, Tiles};
 use reprobe::probe::file::{Probe, Texel};
 use reprobe::probe::parameter_map::ParameterMap;
 use reprobe::scene::{Camera, Scene};
 use reprobe::surface::{CurvatureMap, CurvatureParams, curvature};
 use reprobe::transport::World;
-use reprobe::view::composite::downsample;
+use reprobe::view::composite::{diffuse_layer, downsample, emission_layer};
 use reprobe::view::gbuffer::{GBuffer, Pixel, gbuffer};
 use reprobe::view::mirror::{Reflected, mirror_direction, mirror_hit, mirror_pass};
 use reprobe::view::mirror_light::{add_mirrored, mirror_light_pass};
@@ -183,6 +187,64 @@ fn the_paraboloid_serves_a_mirror_sphere_better_than_its_tangent_planes() {
     assert!(solved < 0.95 * second && second < 0.6 * flat, "Newton {solved}, second order {second}, plane {flat}");
 }
 
+/// Some rows at a time or pass after pass, in a view whose last rows and columns fill no tile: the same bits, in memory used before as well.
+#[test]
+fn passes_over_some_rows_leave_what_those_over_the_whole_view_do() {
+    let lobe = r#"<bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.2"/></bsdf>"#;
+    let scene = room_of(
+        "0.5",
+        &format!(
+            r#"<shape type="sphere"><point name="center" x="-0.6" y="0" z="0.6"/><float name="radius" value="0.4"/>{MIRROR}</shape>
+               <shape type="rectangle"><transform name="to_world"><translate value="0.4,0,0.1"/></transform>{lobe}</shape>"#
+        ),
+    );
+    let setup = Setup::new(scene, Vec3::new(0.2, 0.1, 2.0), 0.6, 64);
+    let geometry = &setup.world.scene.geometry;
+    let atlas = Atlas::build(geometry, &|_| true, &AtlasParams { texel: Some(0.1), ..Default::default() }).unwrap();
+    let colours = (0..atlas.size[0] * atlas.size[1]).map(|i| Vec3::new((i % 7) as f32, (i % 5) as f32, (i % 3) as f32)).collect();
+    let map = sides(geometry, &atlas, colours, None);
+    let candidates: Vec<_> = setup.probes.iter().map(|p| Candidates::new(&setup.world, p, Some(0.5), true)).collect();
+    let of = |(index, (probe, candidates))| WeightedProbe { index, probe, candidates, weight: 0.125 };
+    let probes: Vec<_> = setup.probes.iter().zip(&candidates).enumerate().map(of).collect();
+    let (footprint, filter) = (Footprint::new(&FootprintParams::default()), FilterParams::default());
+    let tiles = Tiles {
+        world: &setup.world,
+        curvature: &setup.curvature,
+        lightmap: Some(&map),
+        mirrors: Some(&map),
+        probes: &probes,
+        roughness_scale: 0.5,
+        gather: &GatherParams::default(),
+        footprint: Some(&footprint),
+        filter: &filter,
+        previous: None,
+    };
+    let mut room = Room::default();
+    for origin in [Vec3::new(0.3, 0.05, 2.1), Vec3::new(0.2, 0.1, 2.0)] {
+        let camera = Camera::look_at(origin, Vec3::ZERO, Vec3::new(0.2, 1.0, 0.0), 1.0, [61, 45]);
+        let view = gbuffer(&setup.world, &setup.curvature, &camera);
+        let (reflected, mirrored) = mirror_light_pass(&setup.world, &map, &view);
+        let whole = tiles.whole(&camera);
+        let filtered = whole.filtered(&filter);
+        let gathered = whole.buffers().gathered;
+        let (mut planes, tally) = tiles.run(&camera, &mut room);
+        assert_eq!(planes.shown, shown(&view, &reflected));
+        assert_eq!(planes.mirrored, mirrored);
+        assert_eq!(planes.emission, emission_layer(&view));
+        assert_eq!(planes.diffuse, diffuse_layer(&setup.world.scene, &view, &map));
+        assert_eq!(planes.glossy, gathered.iter().map(|g| g.color).collect::<Vec<_>>());
+        let is_unserved =
+            |(p, g): &(&Option<Pixel>, &Gathered)| p.as_ref().is_some_and(|p| p.alpha.is_some()) && g.energy.is_infinite();
+        assert_eq!(tally.unserved, view.pixels.iter().zip(&gathered).filter(is_unserved).count());
+        assert!(tally.unserved * 10 < gathered.len(), "{} pixels without a sample", tally.unserved);
+        room.filter(61, &mut planes.glossy, &filter);
+        assert_eq!(planes.glossy, filtered);
+        let changed = filtered.iter().zip(&gathered).filter(|(f, g)| (**f - g.color).length() > 1e-3).count();
+        assert!(changed * 20 > filtered.len(), "the filter changes {changed} pixels");
+        room.take(planes);
+    }
+}
+
 #[test]
 fn coverage_antialiases_edges_and_what_mirrors_show_of_them() {
     let scene = room(&format!(
@@ -211,7 +273,7 @@ fn coverage_antialiases_edges_and_what_mirrors_show_of_them() {
     for n in [1, 2] {
         let (view, reflected, glossy, emission) = ideal(n);
         let plain = [down(&glossy, n), down(&emission, n)];
-        let sub = SubPixels { view: &view, reflected: &reflected, glossy: &glossy, n: n as usize };
+        let sub = SubPixels { shown: &shown(&view, &reflected), glossy: &glossy, size: view.size(), n: n as usize };
         let mut better = plain.clone();
         let covered = covered_pixels(&setup.world, None, false, &camera, &sub, &CoverageParams::default());
         assert!(covered.len() * 2 < better[0].len(), "{} of {} pixels count as edges", covered.len(), better[0].len());
@@ -270,7 +332,7 @@ fn what_perfect_mirrors_show_of_lamps_needs_no_texels() {
         let all = setup.gather_with(&view, &reflected, &GatherParams::default(), mirror_light);
         all.iter().map(|g| g.color).collect()
     };
-    let (plain, lit) = (wrong(&gathered(false)), wrong(&add_mirrored(&gathered(true), &shown)));
+    let (plain, lit) = (wrong(&gathered(false)), wrong(&add_mirrored(&gathered(true), shown)));
     assert!(plain.1 > 500 && plain.0 > 500, "{plain:?}: nothing to be cured");
     assert_eq!(lit.0, 0, "of {}", lit.1);
 }

@@ -20,15 +20,27 @@ impl Clock {
         self.last = Instant::now();
     }
 
+    /// Notes what has passed since the last lap, shared among passes that went by together in proportion to their `parts` of it.
+    pub fn share(&mut self, passes: &[&'static str], parts: &[f64]) {
+        let now = Instant::now();
+        let scale = (now - self.last).as_secs_f64() * 1e3 / parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        passes.iter().zip(parts).for_each(|(pass, part)| self.add(pass, part * scale));
+        self.last = now;
+    }
+
     /// Notes what has passed since the last lap, added to what `pass` took before.
     pub fn lap(&mut self, pass: &'static str) {
         let now = Instant::now();
         let ms = (now - self.last).as_secs_f64() * 1e3;
+        self.add(pass, ms);
+        self.last = now;
+    }
+
+    fn add(&mut self, pass: &'static str, ms: f64) {
         match self.laps.iter_mut().find(|(name, _)| *name == pass) {
             Some((_, sum)) => *sum += ms,
             None => self.laps.push((pass, ms)),
         }
-        self.last = now;
     }
 }
 

@@ -123,13 +123,18 @@ impl Camera {
     /// Ray through `pixel` (pixels, (0, 0) the upper left corner of the image) and the point
     /// of the lens that `lens` in [0, 1)² maps to.
     pub fn ray(&self, pixel: Vec2, lens: Vec2) -> Ray {
+        self.ray_of(self.focal_px(), pixel, lens)
+    }
+
+    /// [`Camera::ray`], where [`Camera::focal_px`] is at hand: a tangent, which is as long as the rest.
+    pub(crate) fn ray_of(&self, focal_px: f32, pixel: Vec2, lens: Vec2) -> Ray {
         let to_axis = self.axis_px() - pixel;
         if let Some(half) = self.orthographic {
             let origin = (to_axis * half * (2.0 / self.size[0] as f32)).extend(0.0);
             let d = self.to_world.transform_vector3(Vec3::Z).normalize();
             return self.clipped(Ray::new(self.to_world.transform_point3(origin), d), 1.0);
         }
-        let d = to_axis.extend(self.focal_px());
+        let d = to_axis.extend(focal_px);
         if self.aperture_radius == 0.0 {
             let ray = Ray::new(self.position(), self.to_world.transform_vector3(d).normalize());
             return self.clipped(ray, d.length() / d.z);

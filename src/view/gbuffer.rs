@@ -58,31 +58,20 @@ impl GBuffer {
 }
 
 /// Side of the squares of pixels whose rays are followed together.
-const BLOCK: usize = 4;
+pub(crate) const BLOCK: usize = 4;
 
 /// Casts the camera's rays.
 pub fn gbuffer(world: &World, curvature: &CurvatureMap, camera: &Camera) -> GBuffer {
-    gbuffer_in(world, curvature, camera, None)
-}
-
-/// [`gbuffer`], in the room of another that is no longer needed: memory that the system has to clear first takes as long as the rays.
-pub fn gbuffer_in(world: &World, curvature: &CurvatureMap, camera: &Camera, room: Option<GBuffer>) -> GBuffer {
     let [width, height] = camera.size.map(|s| s as usize);
     let count = width * height;
-    let (mut pixels, mut background) = room.map_or_else(Default::default, |room| (room.pixels, room.background));
-    pixels.clear();
-    background.clear();
-    pixels.reserve_exact(count);
-    background.reserve_exact(count);
+    let (mut pixels, mut background) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let of_strip = |(strip, (pixels, background)): (usize, (&mut [MaybeUninit<_>], &mut [MaybeUninit<_>]))| {
         for left in (0..width).step_by(BLOCK) {
-            for (at, ray, hit) in block(world, camera, [left, strip * BLOCK]) {
-                let (seen, behind) = match world.seen_from(&ray, hit) {
-                    Some(surface) => (Some(pixel(world, curvature, surface, -ray.d)), Rgb::ZERO),
-                    None => (None, world.backdrop(ray.d)),
-                };
-                pixels[at - strip * BLOCK * width].write(seen);
-                background[at - strip * BLOCK * width].write(behind);
+            for ([x, y], ray, hit) in block(world, camera, [left, strip * BLOCK]) {
+                let at = (y - strip * BLOCK) * width + x;
+                let (seen, behind) = seen(world, curvature, &ray, hit);
+                pixels[at].write(seen);
+                background[at].write(behind);
             }
         }
     };
@@ -97,21 +86,35 @@ pub fn gbuffer_in(world: &World, curvature: &CurvatureMap, camera: &Camera, room
     GBuffer { camera: camera.clone(), pixels, background }
 }
 
-/// The pixels of a square, by index, with their rays and what these meet first. Followed together they share the way through the tree.
-fn block(world: &World, camera: &Camera, [left, top]: [usize; 2]) -> impl Iterator<Item = (usize, Ray, Option<Hit>)> {
+/// The pixels of a square of [`BLOCK`] a side, with their rays and what these meet first. Followed together they share the way through the
+/// tree.
+pub(crate) fn block(
+    world: &World,
+    camera: &Camera,
+    [left, top]: [usize; 2],
+) -> impl Iterator<Item = ([usize; 2], Ray, Option<Hit>)> {
     let [width, height] = camera.size.map(|s| s as usize);
     let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); BLOCK * BLOCK];
-    let mut at = [0; BLOCK * BLOCK];
-    let mut count = 0;
+    let mut at = [[0; 2]; BLOCK * BLOCK];
+    let (mut count, focal_px) = (0, camera.focal_px());
     for y in top..(top + BLOCK).min(height) {
         for x in left..(left + BLOCK).min(width) {
             let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            (rays[count], at[count]) = (camera.ray(centre, Vec2::splat(0.5)), y * width + x);
+            (rays[count], at[count]) = (camera.ray_of(focal_px, centre, Vec2::splat(0.5)), [x, y]);
             count += 1;
         }
     }
     let hits = world.closest_of(&rays[..count]);
     (0..count).map(move |i| (at[i], rays[i], hits[i]))
+}
+
+/// What a ray shows whose first hit is known, and the radiance of the environment where it shows no surface.
+#[inline]
+pub(crate) fn seen(world: &World, curvature: &CurvatureMap, ray: &Ray, hit: Option<Hit>) -> (Option<Pixel>, Rgb) {
+    match world.seen_from(ray, hit) {
+        Some(surface) => (Some(pixel(world, curvature, surface, -ray.d)), Rgb::ZERO),
+        None => (None, world.backdrop(ray.d)),
+    }
 }
 
 fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) -> Pixel {

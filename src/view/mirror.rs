@@ -6,6 +6,7 @@ use super::gbuffer::GBuffer;
 use crate::base::math::reflect;
 use crate::material::Surface;
 use crate::transport::World;
+use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -15,7 +16,7 @@ pub const SKY: u16 = u16::MAX - 1;
 pub const NOTHING: u16 = u16::MAX;
 
 /// What a mirror at a surface point shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Zeroable)]
 pub struct Reflected {
     /// World position of the reflected hit; the unit direction towards it where `material` is [`SKY`].
     pub point: Vec3,

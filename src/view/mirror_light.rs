@@ -5,7 +5,7 @@
 //! rough surfaces in the mirror reflect: a bake tells of its texels that see a perfect mirror what the same lookup finds along their own
 //! mirror ray; that is taken out before the gather, and the view's pixels get what is found along theirs after the filter.
 
-use super::gbuffer::{GBuffer, GLOSSY, is_glossy};
+use super::gbuffer::{GBuffer, GLOSSY, Pixel, is_glossy};
 use super::mirror::{Reflected, SKY, mirror_direction, mirror_hit};
 use crate::base::math::Rgb;
 use crate::lightmap::LightMap;
@@ -76,19 +76,22 @@ pub fn mirror_light(world: &World, lightmap: &LightMap, surface: &Surface, wo: V
 
 /// [`crate::view::mirror::mirror_pass`], and what the view's perfect mirrors show, by the same rays; black at other pixels.
 pub fn mirror_light_pass(world: &World, lightmap: &LightMap, view: &GBuffer) -> (Vec<Reflected>, Vec<Rgb>) {
-    let pixels = view.pixels.par_iter().with_min_len(view.size()[0]);
-    pixels
-        .map(|pixel| match pixel {
-            Some(p) if p.alpha == Some(0.0) => mirror_light(world, lightmap, &p.surface, p.wo),
-            Some(p) if p.alpha.is_some() => (mirror_hit(world, &p.surface, p.wo), Rgb::ZERO),
-            _ => (Reflected::NONE, Rgb::ZERO),
-        })
-        .unzip()
+    view.pixels.par_iter().with_min_len(view.size()[0]).map(|pixel| mirrored(world, Some(lightmap), pixel)).unzip()
+}
+
+/// The mirror hit of a pixel, and what it shows where it is a perfect mirror and `lightmap` lights those.
+pub(crate) fn mirrored(world: &World, lightmap: Option<&LightMap>, pixel: &Option<Pixel>) -> (Reflected, Rgb) {
+    match (pixel, lightmap) {
+        (Some(p), Some(lightmap)) if p.alpha == Some(0.0) => mirror_light(world, lightmap, &p.surface, p.wo),
+        (Some(p), _) if p.alpha.is_some() => (mirror_hit(world, &p.surface, p.wo), Rgb::ZERO),
+        _ => (Reflected::NONE, Rgb::ZERO),
+    }
 }
 
 /// Both parts of a view's glossy layer together. What the probes are left with may be below zero by rounding or noise; the sum is not.
-pub fn add_mirrored(rest: &[Rgb], mirrored: &[Rgb]) -> Vec<Rgb> {
-    rest.par_iter().zip(mirrored).map(|(&a, &b)| (a + b).max(Rgb::ZERO)).collect()
+pub fn add_mirrored(rest: &[Rgb], mut mirrored: Vec<Rgb>) -> Vec<Rgb> {
+    mirrored.par_iter_mut().zip(rest).for_each(|(b, &a)| *b = (a + *b).max(Rgb::ZERO));
+    mirrored
 }
 
 /// Directional albedo of a surface's non-diffuse lobes towards `wo` (unit, world, away from it), at its own roughness.

@@ -127,6 +127,11 @@ pub trait Simd: Copy {
     /// # Panics
     /// If there are fewer than four.
     fn fours(self, from: &[f32], at: Self::I) -> [Self::F; 4];
+    /// [`Simd::fours`] of eight offsets that begin at `at` and lie four apart.
+    ///
+    /// # Panics
+    /// If there are not as many.
+    fn fours_in_row(self, from: &[f32], at: usize) -> [Self::F; 4];
     /// The one at each of eight places in `from`; a place past the end counts as the last.
     ///
     /// # Panics

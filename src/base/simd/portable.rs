@@ -183,6 +183,11 @@ impl Simd for Portable {
         std::array::from_fn(|k| row.map(|row| from[row + k]))
     }
     #[inline(always)]
+    fn fours_in_row(self, from: &[f32], at: usize) -> [[f32; 8]; 4] {
+        let row = &from[at..at + 32];
+        std::array::from_fn(|k| std::array::from_fn(|i| row[4 * i + k]))
+    }
+    #[inline(always)]
     fn ones(self, from: &[u32], at: [u32; 8]) -> [u32; 8] {
         assert!(!from.is_empty(), "nothing to load from");
         at.map(|at| from[(at as usize).min(from.len() - 1)])

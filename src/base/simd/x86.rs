@@ -162,6 +162,26 @@ macro_rules! common {
             }
         }
         #[inline(always)]
+        fn fours_in_row(self, from: &[f32], at: usize) -> [__m256; 4] {
+            let row = &from[at..at + 32];
+            unsafe {
+                // In bounds: the last of the four begins at 24.
+                let p = row.as_ptr();
+                let (p01, p23) = (_mm256_loadu_ps(p), _mm256_loadu_ps(p.add(8)));
+                let (p45, p67) = (_mm256_loadu_ps(p.add(16)), _mm256_loadu_ps(p.add(24)));
+                let (a, b) = (_mm256_permute2f128_ps::<0x20>(p01, p45), _mm256_permute2f128_ps::<0x31>(p01, p45));
+                let (c, d) = (_mm256_permute2f128_ps::<0x20>(p23, p67), _mm256_permute2f128_ps::<0x31>(p23, p67));
+                let (ab, cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+                let (ab_high, cd_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+                [
+                    _mm256_shuffle_ps::<0b01_00_01_00>(ab, cd),
+                    _mm256_shuffle_ps::<0b11_10_11_10>(ab, cd),
+                    _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+                    _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+                ]
+            }
+        }
+        #[inline(always)]
         fn ones(self, from: &[u32], at: __m256i) -> __m256i {
             assert!(!from.is_empty(), "nothing to load from");
             let last = u32::try_from(from.len() - 1).unwrap_or(u32::MAX);

@@ -8,7 +8,7 @@ use crate::lightmap::{fill, receivers};
 use crate::material::bsdf::{Distribution, Lobes, albedo, microfacet, principled, roughplastic};
 use crate::material::surface;
 use crate::method::glossy_probes::gpu::{footprint as gpu_footprint, gather as gpu_gather};
-use crate::method::glossy_probes::{coverage, filter, footprint, gather_params, perturb, previous};
+use crate::method::glossy_probes::{coverage, filter, footprint, gather_params, perturb, previous, shown};
 use crate::method::light_field_probes::{ambient, gpu as gpu_light_field, march, octree, probe, shade, trace};
 use crate::method::many_light::{
     adaptive, bounce, descend, disc, emit, follow, gather as many_lights_gather, params as many_light_params,
@@ -64,10 +64,10 @@ type Twins = Vec<(String, Vec<Number>)>;
 fn twins(file: &str) -> Twins {
     match file {
         "glossy_probes/cover.wgsl" => twins! {
-            MIN_NORMAL_COS = coverage::MIN_NORMAL_COS;
-            DEPTH_TOLERANCE = coverage::DEPTH_TOLERANCE;
-            SHARP_ALPHA = coverage::SHARP_ALPHA;
-            REFLECTED_TOLERANCE = coverage::REFLECTED_TOLERANCE;
+            MIN_NORMAL_COS = shown::MIN_NORMAL_COS;
+            DEPTH_TOLERANCE = shown::DEPTH_TOLERANCE;
+            SHARP_ALPHA = shown::SHARP_ALPHA;
+            REFLECTED_TOLERANCE = shown::REFLECTED_TOLERANCE;
             PERFECT_RAYS = mirror_light::PERFECT.rays;
             GOLDEN_RATIO = coverage::GOLDEN_RATIO;
         },

@@ -48,14 +48,19 @@ fn gather_by(
     image.par_chunks_mut(width.max(1) * TILE).enumerate().for_each(|(strip, out)| {
         for left in (0..width).step_by(TILE) {
             let tile = tile(view, reflected, [left, strip * TILE]);
-            let albedo = |p: &Pixel| params.albedo_ratio.then(|| view_albedo(world, p, roughness_scale));
             let search = BestSamples { eye, reflected, tile: &tile, width, probes, params };
-            let albedos = tile.iter().map(|(_, p)| albedo(p)).collect();
-            let found = lanes.run(Tile { search, albedos });
+            let found = gather_tile(lanes, world, search, roughness_scale);
             tile.iter().zip(found).for_each(|((i, _), g)| out[i - strip * TILE * width] = g);
         }
     });
     image
+}
+
+/// Gathers the pixels of a tile.
+pub(crate) fn gather_tile(lanes: Lanes, world: &World, search: BestSamples, roughness_scale: f32) -> Vec<Gathered> {
+    let albedo = |p: &Pixel| search.params.albedo_ratio.then(|| view_albedo(world, p, roughness_scale));
+    let albedos = search.tile.iter().map(|(_, p)| albedo(p)).collect();
+    lanes.run(Tile { search, albedos })
 }
 
 /// A tile's search and what comes of it.

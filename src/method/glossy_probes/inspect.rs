@@ -1,6 +1,6 @@
 //! Layers that show how a glossy-probe frame came about (`--aov all`).
 
-use super::renderer::Buffers;
+use super::whole::Buffers;
 use crate::io::ExrImage;
 use crate::view::mirror::{NOTHING, SKY};
 use glam::Vec3;

@@ -4,7 +4,8 @@
 //! each direction deserves (§4.2.1); [`quasi_harmonic`] turns that into a deformed lat-long mesh, and [`qhmap`] into the probe's
 //! parameterisation (§4.2.2); [`bake`] fills the texels (§4.1), all of them or those that [`wanted`] names.
 //!
-//! A frame, pass by pass: [`renderer`] is the table of contents (§5, §6). [`rays`] may be joined with it.
+//! A frame, pass by pass: [`renderer`] is the table of contents (§5, §6), and [`tiles`] has the passes before the filter. [`rays`] may be joined
+//! with it.
 
 pub mod bake;
 mod between;
@@ -33,7 +34,10 @@ mod row;
 pub mod samples;
 pub mod search;
 pub mod seen;
+pub mod shown;
+pub mod tiles;
 pub mod wanted;
+pub mod whole;
 mod window;
 
 pub use row::{METHOD, resolve};

@@ -25,13 +25,22 @@ pub fn tiles<'a>(view: &'a GBuffer, reflected: &[Reflected]) -> Vec<Vec<(usize, 
 }
 
 /// The one of them whose upper left corner is given.
-pub(crate) fn tile<'a>(view: &'a GBuffer, reflected: &[Reflected], [x, y]: [usize; 2]) -> Vec<(usize, &'a Pixel)> {
-    let [width, height] = view.size();
+pub(crate) fn tile<'a>(view: &'a GBuffer, reflected: &[Reflected], corner: [usize; 2]) -> Vec<(usize, &'a Pixel)> {
+    tile_of(&view.pixels, reflected, view.size()[0], corner)
+}
+
+/// The same of rows of so many pixels.
+pub(crate) fn tile_of<'a>(
+    pixels: &'a [Option<Pixel>],
+    reflected: &[Reflected],
+    width: usize,
+    [x, y]: [usize; 2],
+) -> Vec<(usize, &'a Pixel)> {
     let glossy = |i: usize| {
-        let pixel = view.pixels[i].as_ref().filter(|p| p.alpha.is_some() && reflected[i].material != NOTHING);
+        let pixel = pixels[i].as_ref().filter(|p| p.alpha.is_some() && reflected[i].material != NOTHING);
         pixel.map(|p| (i, p))
     };
-    let rows = y..(y + TILE).min(height);
+    let rows = y..(y + TILE).min(pixels.len() / width.max(1));
     rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x)).filter_map(glossy).collect()
 }
 

@@ -3,14 +3,14 @@
 //! *Paper* (§6.3): passes 1 and 3 run along the first principal direction of each pixel's covariance, 2 and 4 along the second, with
 //! halved covariances, so that a neighbour round the corner of an edge is still reached.
 //! *Ours*: a pass steps along the axis nearest its direction and reads the two pixels nearest the line, each with its own range weight. Lanes
-//! hold eight steps of one pixel's line, four to either side.
+//! hold a step of the lines of eight pixels side by side: most lines are short.
 
-use super::{Convolution, FilterInput, FilterParams, Kernel, NOT_GLOSSY, confidence, principal};
+use super::planes::{Guides, Planes};
+use super::{FilterInput, FilterParams, Kernel, NOT_GLOSSY};
 use crate::base::math::Rgb;
 use crate::base::simd::functions::exp_down;
 use crate::base::simd::lane::{F8, M8, V3};
 use crate::base::simd::{self, Lanes, Simd};
-use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 /// Steps a standard deviation at most: a wider kernel's are longer. The sum of a Gaussian at these steps is its integral to
@@ -35,22 +35,6 @@ pub(crate) fn gaussians(kernel: Kernel) -> &'static [(f32, f32)] {
     }
 }
 
-/// A pixel's own kernel.
-#[derive(Clone, Copy)]
-struct Axes {
-    major: Vec2,
-    /// Standard deviations of one pass along the major and the minor axis, for a Gaussian of the covariance itself.
-    sigma: Vec2,
-}
-
-/// What stays the same from pass to pass, a pixel an entry.
-struct Guides<'a> {
-    axes: Vec<Axes>,
-    /// Normal and depth.
-    surface: Vec<[f32; 4]>,
-    material: &'a [u32],
-}
-
 /// Filters a frame.
 pub(super) fn four_pass(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
     four_pass_by(Lanes::chosen(), input, params)
@@ -58,47 +42,19 @@ pub(super) fn four_pass(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> 
 
 /// [`four_pass`] in one form of lanes.
 pub(super) fn four_pass_by(lanes: Lanes, input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
-    let count = input.color.len();
-    let split = if params.method == Convolution::TwoPass { 1.0 } else { 2.0 };
-    let rows = || (0..count).into_par_iter().with_min_len(input.width);
-    let axes = |i: usize| {
-        let (major, a, b) = principal(input.covariance[i]);
-        Axes { major, sigma: Vec2::new((a / split).sqrt(), (b / split).sqrt()) }
-    };
-    let surface = |i: usize| input.normal[i].extend(input.depth[i]).to_array();
-    // Colour times weight, and the weight.
-    let start = |i: usize| {
-        let w = confidence(input, i, params);
-        if w > 0.0 { (input.color[i] * w).extend(w).to_array() } else { [0.0; 4] }
-    };
-    let guides = Guides { axes: rows().map(axes).collect(), surface: rows().map(surface).collect(), material: input.material };
-    let start: Vec<[f32; 4]> = rows().map(start).collect();
-    let mut out = vec![Rgb::ZERO; count];
-    let mut spare = vec![[0.0; 4]; count];
-    for &(share, variance) in gaussians(params.kernel) {
-        let (mut from, mut to) = (start.clone(), spare);
-        for number in 0..2 * split as usize {
-            pass((lanes, input.width), params, &guides, &from, &mut to, (number % 2 == 0, variance.sqrt()));
-            std::mem::swap(&mut from, &mut to);
-        }
-        out.par_iter_mut().zip(&from).zip(input.color).for_each(|((o, value), &c)| {
-            let value = Vec4::from_array(*value);
-            *o += if value.w > 0.0 { value.xyz() / value.w * share } else { c * share };
-        });
-        spare = to;
-    }
-    // Bit for bit what came in, where nothing was to be filtered.
-    out.par_iter_mut().enumerate().for_each(|(i, o)| {
-        if input.material[i] == NOT_GLOSSY || guides.axes[i].sigma.x < MIN_SIGMA * 0.5 {
-            *o = input.color[i];
-        }
+    let mut planes = Planes::default();
+    planes.resize(input.color.len());
+    planes.chunks(input.width).enumerate().for_each(|(y, mut rows)| {
+        (0..input.width).for_each(|x| rows.set(x, Some(&input.entry(y * input.width + x)), params));
     });
-    out
+    let mut color = input.color.to_vec();
+    planes.filter((lanes, input.width), &mut color, params);
+    color
 }
 
 /// One pass: each pixel's value becomes the mean over its line. Weighted colour and weight are carried alike.
 /// `kernel` says whether the line is the major axis, and what multiplies its standard deviation.
-fn pass(
+pub(super) fn pass(
     (lanes, width): (Lanes, usize),
     params: &FilterParams,
     guides: &Guides,
@@ -133,14 +89,10 @@ impl simd::Kernel for Strip<'_> {
         let image = Image { s, width, height: from.len() / width, params, guides, from: from.as_flattened() };
         for left in (0..width).step_by(TILE.1) {
             for row in 0..out.len() / width {
-                for x in left..(left + TILE.1).min(width) {
+                let right = (left + TILE.1).min(width);
+                for x in (left..right).step_by(8) {
                     let at = row * width + x;
-                    let Axes { major, sigma } = guides.axes[first + at];
-                    let (direction, sigma) = if kernel.0 { (major, sigma.x) } else { (major.perp(), sigma.y) };
-                    let sigma = (sigma * kernel.1).min(params.max_radius / params.radius_sigmas);
-                    let own = from[first + at];
-                    let is_filtered = guides.material[first + at] != NOT_GLOSSY && sigma >= MIN_SIGMA;
-                    out[at] = if is_filtered { image.line_mean([x, first / width + row], own, direction, sigma) } else { own };
+                    image.line_mean([x, first / width + row], kernel, &mut out[at..at + (right - x).min(8)]);
                 }
             }
         }
@@ -157,78 +109,164 @@ struct Image<'a, S: Simd> {
     from: &'a [f32],
 }
 
-/// Of lanes: which step along the line, and to which side.
-const STEP: [f32; 8] = [1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 3.0, 4.0];
-const SIDE: [f32; 8] = [-1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0];
+const LANES: [f32; 8] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl<S: Simd> Image<'_, S> {
-    /// The mean over the line through pixel (x, y).
+    /// The means over the lines through at most eight pixels of a row, the first of which is (x, y).
     #[inline(always)]
-    fn line_mean(&self, [x, y]: [usize; 2], own: [f32; 4], direction: Vec2, sigma: f32) -> [f32; 4] {
+    fn line_mean(&self, [x, y]: [usize; 2], kernel: (bool, f32), out: &mut [[f32; 4]]) {
         let (s, i) = (self.s, y * self.width + x);
-        let (horizontal, vertical) = ((x, self.width, 1), (y, self.height, self.width));
-        // `long` is the axis nearest the line, `short` the other one.
-        let upright = direction.y.abs() > direction.x.abs();
-        let (long, short) = if upright { (vertical, horizontal) } else { (horizontal, vertical) };
-        let slope = if upright { direction.x / direction.y } else { direction.y / direction.x };
-        // Pixels of one step along the long axis, and its length.
-        let stride = ((sigma / STEPS) as usize).max(1);
-        let step = stride as f32 * (1.0 + slope * slope).sqrt();
-        let reach = self.params.radius_sigmas * sigma / step;
-        let most = [long.0, long.1 - 1 - long.0].map(|room| ((room / stride) as f32).min(reach.floor()));
-        let falls = -0.5 * (step / sigma) * (step / sigma);
-        let side = F8::load(s, &SIDE);
-        let most = (side.below(0.0).choose(F8::splat(s, most[0]), F8::splat(s, most[1])), most[0].max(most[1]));
-        let mut sum = Sum { value: [F8::splat(s, 0.0); 4], weight: F8::splat(s, 0.0) };
-        let own_surface = Own::new(s, self.guides, i);
-        let mut done = 0.0;
-        while done < most.1 {
-            let k = F8::load(s, &STEP) + done;
-            let on_line = !most.0.less(k);
-            let along = side * k * stride as f32;
-            let across = along * slope;
-            let low = across.floor();
-            let (fraction, g) = (across - low, exp_down(k * k * falls));
-            let at = low + short.0 as f32;
-            let index = self.offset(along, long.2, self.offset(low, short.2, s.splat_ids(i as u32)));
-            let inside = on_line & !at.below(0.0) & at.below(short.1 as f32);
-            self.add(&mut sum, &own_surface, index, inside, g * (fraction * -1.0 + 1.0));
-            if slope != 0.0 {
-                let (next, index) = (at + 1.0, s.add_ids(index, s.splat_ids(short.2 as u32)));
-                let inside = on_line & !next.below(0.0) & next.below(short.1 as f32);
-                self.add(&mut sum, &own_surface, index, inside, g * fraction);
-            }
-            done += 4.0;
+        let own = s.add_ids(s.splat_ids(i as u32), F8::load(s, &LANES).ids());
+        let lines = Lines::new(self, [x, y], own, kernel);
+        let is_filtered = lines.is_filtered & F8::load(s, &LANES).below(out.len() as f32);
+        out.copy_from_slice(&self.from.as_chunks().0[i..i + out.len()]);
+        if is_filtered.bits() == 0 {
+            return;
         }
-        let total = 1.0 + sum.weight.sum();
-        let [r, g, b, w] = sum.value;
-        [(own[0] + r.sum()) / total, (own[1] + g.sum()) / total, (own[2] + b.sum()) / total, (own[3] + w.sum()) / total]
+        let zero = F8::splat(s, 0.0);
+        let most = [is_filtered.choose(lines.most[0], zero), is_filtered.choose(lines.most[1], zero)];
+        let own_surface = Own::new(s, self.guides, (i, own));
+        let mut sum = Sum { value: [zero; 4], weight: zero };
+        let mut step = 1.0;
+        loop {
+            let (before, after) = (!most[0].below(step), !most[1].below(step));
+            if (before | after).bits() == 0 {
+                break;
+            }
+            let weight = exp_down(lines.falls * (step * step));
+            self.step(&mut sum, &lines, &own_surface, (lines.stride * -step, before, weight));
+            self.step(&mut sum, &lines, &own_surface, (lines.stride * step, after, weight));
+            step += 1.0;
+        }
+        let total = sum.weight + 1.0;
+        let [r, g, b, w] = s.fours(self.from, s.shift_up::<2>(own));
+        let [sum_r, sum_g, sum_b, sum_w] = sum.value;
+        let (r, g) = (((F8(s, r) + sum_r) / total).array(), ((F8(s, g) + sum_g) / total).array());
+        let (b, w) = (((F8(s, b) + sum_b) / total).array(), ((F8(s, w) + sum_w) / total).array());
+        let bits = is_filtered.bits();
+        for (lane, out) in out.iter_mut().enumerate() {
+            if bits >> lane & 1 == 1 {
+                *out = [r[lane], g[lane], b[lane], w[lane]];
+            }
+        }
     }
 
-    /// `from` and so many pixels `by` apart.
+    /// Adds the two pixels nearest each line, so many pixels `along` its long axis.
     #[inline(always)]
-    fn offset(&self, count: F8<S>, by: usize, from: S::I) -> S::I {
-        let s = self.s;
-        s.add_ids(s.mul_ids(count.ids(), s.splat_ids(by as u32)), from)
+    fn step(&self, sum: &mut Sum<S>, lines: &Lines<S>, own: &Own<S>, (along, counts, weight): (F8<S>, M8<S>, F8<S>)) {
+        if counts.bits() == 0 {
+            return;
+        }
+        let across = along * lines.slope;
+        let low = across.floor();
+        let fraction = across - low;
+        let at = low + lines.short.0;
+        let by = along * lines.long_by + low * lines.short_by;
+        let inside = counts & !at.below(0.0) & at.less(lines.short.1);
+        self.add(sum, own, by, inside, weight * (fraction * -1.0 + 1.0));
+        let next = at + 1.0;
+        let inside = counts & fraction.above(0.0) & !next.below(0.0) & next.less(lines.short.1);
+        if inside.bits() != 0 {
+            self.add(sum, own, by + lines.short_by, inside, weight * fraction);
+        }
     }
 
-    /// Adds eight pixels, those that count and are of one surface with the line's own.
+    /// Adds eight pixels `by` so many indices from the lines' own, those that count and are of one surface.
     #[inline(always)]
-    fn add(&self, sum: &mut Sum<S>, own: &Own<S>, index: S::I, counts: M8<S>, weight: F8<S>) {
+    fn add(&self, sum: &mut Sum<S>, own: &Own<S>, by: F8<S>, counts: M8<S>, weight: F8<S>) {
         let s = self.s;
-        let at = s.shift_up::<2>(index);
-        let [nx, ny, nz, depth] = s.fours(self.guides.surface.as_flattened(), at);
+        let Read { surface: [nx, ny, nz, depth], material, value: [r, g, b, w] } = self.read(own, by);
         let normal = V3 { x: F8(s, nx), y: F8(s, ny), z: F8(s, nz) };
         let near = (own.depth - F8(s, depth)).abs().below(self.params.depth_threshold);
         let facing = own.normal.dot(normal).above(self.params.min_normal_cos);
-        let same = M8(s, s.same_ids(own.material, s.ones(self.guides.material, index)));
+        let same = M8(s, s.same_ids(own.material, material));
         let weight = (counts & near & facing & same).choose(weight, F8::splat(s, 0.0));
-        let [r, g, b, w] = s.fours(self.from, at);
         sum.weight = sum.weight + weight;
         sum.value[0] = sum.value[0] + F8(s, r) * weight;
         sum.value[1] = sum.value[1] + F8(s, g) * weight;
         sum.value[2] = sum.value[2] + F8(s, b) * weight;
         sum.value[3] = sum.value[3] + F8(s, w) * weight;
+    }
+
+    /// Normals and depths, materials and values of eight pixels; sooner where they lie side by side, as they mostly do.
+    #[inline(always)]
+    fn read(&self, own: &Own<S>, by: F8<S>) -> Read<S> {
+        let s = self.s;
+        let ids = by.ids();
+        let first = by.array()[0];
+        let begin = own.first as isize + first as isize;
+        let count = self.guides.material.len();
+        let in_row = M8(s, s.same_ids(ids, F8::splat(s, first).ids()));
+        if in_row.bits() == 0xff && begin >= 0 && begin as usize + 8 <= count {
+            let at = begin as usize;
+            let material = self.guides.material[at..].first_chunk().unwrap_or(&[NOT_GLOSSY; 8]);
+            let surface = s.fours_in_row(self.guides.surface.as_flattened(), 4 * at);
+            return Read { surface, material: s.load_ids(material), value: s.fours_in_row(self.from, 4 * at) };
+        }
+        let index = s.add_ids(own.index, ids);
+        let at = s.shift_up::<2>(index);
+        let surface = s.fours(self.guides.surface.as_flattened(), at);
+        Read { surface, material: s.ones(self.guides.material, index), value: s.fours(self.from, at) }
+    }
+}
+
+/// What is read of eight pixels.
+struct Read<S: Simd> {
+    /// Normals and depths.
+    surface: [S::F; 4],
+    material: S::I,
+    value: [S::F; 4],
+}
+
+/// The lines of eight pixels.
+struct Lines<S: Simd> {
+    is_filtered: M8<S>,
+    /// Pixels of one step along the long axis, the one nearest the line.
+    stride: F8<S>,
+    /// Steps to either side.
+    most: [F8<S>; 2],
+    /// Pixels along the short axis, the other one, for one along the long.
+    slope: F8<S>,
+    /// The pixel's place along the short axis, and how many there are.
+    short: (F8<S>, F8<S>),
+    /// Indices from a pixel to the next.
+    long_by: F8<S>,
+    short_by: F8<S>,
+    /// The logarithm of the first step's weight.
+    falls: F8<S>,
+}
+
+impl<S: Simd> Lines<S> {
+    /// Of the pixels `own` from (x, y) on. `kernel` says whether the line is the major axis, and what multiplies its standard deviation.
+    #[inline(always)]
+    fn new(image: &Image<S>, [x, y]: [usize; 2], own: S::I, kernel: (bool, f32)) -> Self {
+        let Image { s, width, height, params, guides, .. } = *image;
+        let (one, by) = (F8::splat(s, 1.0), F8::splat(s, width as f32));
+        let [major_x, major_y, sigma_a, sigma_b] = s.fours(guides.axes.as_flattened(), s.shift_up::<2>(own));
+        let (major_x, major_y, sigma_a, sigma_b) = (F8(s, major_x), F8(s, major_y), F8(s, sigma_a), F8(s, sigma_b));
+        let (dx, dy, sigma) = if kernel.0 { (major_x, major_y, sigma_a) } else { (-major_y, major_x, sigma_b) };
+        let sigma = (sigma * kernel.1).min(F8::splat(s, params.max_radius / params.radius_sigmas));
+        let none = M8(s, s.same_ids(s.ones(guides.material, own), s.splat_ids(NOT_GLOSSY)));
+        let (column, row) = (F8::load(s, &LANES) + x as f32, F8::splat(s, y as f32));
+        let (columns, rows) = (by, F8::splat(s, height as f32));
+        let upright = dx.abs().less(dy.abs());
+        let slope = upright.choose(dx, dy) / upright.choose(dy, dx);
+        let stride = (sigma / STEPS).floor().max(one);
+        let step = stride * (slope * slope + 1.0).sqrt();
+        let reach = (sigma * params.radius_sigmas / step).floor();
+        let (place, count) = (upright.choose(row, column), upright.choose(rows, columns));
+        let most = [(place / stride).floor().min(reach), ((count - 1.0 - place) / stride).floor().min(reach)];
+        let fall = step / sigma;
+        Self {
+            is_filtered: !none & !sigma.below(MIN_SIGMA),
+            stride,
+            most,
+            slope,
+            short: (upright.choose(column, row), upright.choose(columns, rows)),
+            long_by: upright.choose(by, one),
+            short_by: upright.choose(one, by),
+            falls: fall * fall * -0.5,
+        }
     }
 }
 
@@ -238,8 +276,11 @@ struct Sum<S: Simd> {
     weight: F8<S>,
 }
 
-/// The surface of the line's own pixel.
+/// The surfaces of the lines' own pixels.
 struct Own<S: Simd> {
+    /// Index of the first.
+    first: usize,
+    index: S::I,
     normal: V3<S>,
     depth: F8<S>,
     material: S::I,
@@ -247,8 +288,9 @@ struct Own<S: Simd> {
 
 impl<S: Simd> Own<S> {
     #[inline(always)]
-    fn new(s: S, guides: &Guides, i: usize) -> Self {
-        let [x, y, z, depth] = guides.surface[i];
-        Self { normal: V3::splat(s, Vec3::new(x, y, z)), depth: F8::splat(s, depth), material: s.splat_ids(guides.material[i]) }
+    fn new(s: S, guides: &Guides, (first, index): (usize, S::I)) -> Self {
+        let [x, y, z, depth] = s.fours(guides.surface.as_flattened(), s.shift_up::<2>(index));
+        let normal = V3 { x: F8(s, x), y: F8(s, y), z: F8(s, z) };
+        Self { first, index, normal, depth: F8(s, depth), material: s.ones(guides.material, index) }
     }
 }

@@ -13,11 +13,13 @@
 //! give nor take.
 
 pub(crate) mod four_pass;
+pub(crate) mod planes;
 
 use crate::Result;
 use crate::base::math::{Rgb, major_axis};
 use crate::base::named::within;
 use glam::{Vec2, Vec3};
+use planes::Entry;
 use rayon::prelude::*;
 
 /// [`FilterInput::material`] of a pixel without a glossy surface.
@@ -145,16 +147,30 @@ pub fn filter(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
     }
 }
 
+impl FilterInput<'_> {
+    /// Of one pixel.
+    fn entry(&self, i: usize) -> Entry {
+        Entry {
+            color: self.color[i],
+            normal: self.normal[i],
+            depth: self.depth[i],
+            material: self.material[i],
+            covariance: self.covariance[i],
+            energy: self.energy[i],
+        }
+    }
+}
+
 /// Confidence of a pixel: 1/E, clamped; 0 for a pixel that has nothing to give.
-fn confidence(input: &FilterInput, i: usize, params: &FilterParams) -> f32 {
-    if input.material[i] == NOT_GLOSSY || !input.color[i].is_finite() {
+fn confidence(pixel: &Entry, params: &FilterParams) -> f32 {
+    if pixel.material == NOT_GLOSSY || !pixel.color.is_finite() {
         return 0.0;
     }
     if params.min_energy == f32::INFINITY {
         return 1.0;
     }
     // `max` also takes the clamp for an energy that is not a number.
-    1.0 / input.energy[i].max(params.min_energy.max(1e-6)).min(1e6)
+    1.0 / pixel.energy.max(params.min_energy.max(1e-6)).min(1e6)
 }
 
 /// w_r of Eq. 4: whether two pixels lie on one piece of surface.
@@ -207,7 +223,7 @@ fn full(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
                     Kernel::Gaussian => (-0.5 * q).exp(),
                     Kernel::Ggx => (1.0 + CORE_SIGMA * CORE_SIGMA * q).powi(-2),
                 };
-                let weight = spatial * confidence(input, j, params);
+                let weight = spatial * confidence(&input.entry(j), params);
                 if weight > 0.0 {
                     sum += input.color[j] * weight;
                     total += weight;
