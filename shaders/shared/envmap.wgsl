@@ -69,6 +69,23 @@ fn environment_sample(e: u32, v: vec2<f32>) -> Sky {
     return Sky(d, envmap_density(e, place) / lat_long_jacobian(uv.y), envmap_radiance(e, place));
 }
 
+// The numbers with which `environment_sample` finds a direction; of a sun, any.
+fn environment_numbers(e: u32, d: vec3<f32>) -> vec2<f32> {
+    if is_constant(e) {
+        return vec2(fract(atan2(d.y, d.x) / TAU), 0.5 * (1.0 - d.z));
+    }
+    if is_sun(e) {
+        return vec2(0.5);
+    }
+    let p = envmap_place(e, envmap_lat_long(e, d));
+    let c = envmap_corners(e, p);
+    let t = p.at;
+    let columns = environment_u32(e, ENVIRONMENT_COLUMN_SUMS) + p.y.x * (envmap_cells(e).x + 1u);
+    let x = linear_share(t.x, mix(c.x, c.z, t.y), mix(c.y, c.w, t.y));
+    let y = linear_share(t.y, c.x + c.y, c.z + c.w);
+    return vec2(number_at(columns, p.x.x, x), number_at(environment_u32(e, ENVIRONMENT_ROW_SUMS), p.y.x, y));
+}
+
 fn sun_sample(e: u32, v: vec2<f32>) -> Sky {
     let below_tip = v.y * environment_f32(e, ENVIRONMENT_SCALE);
     let r = sqrt(max(below_tip * (2.0 - below_tip), 0.0));
@@ -154,6 +171,16 @@ fn sample_linear(u: f32, a: f32, b: f32) -> f32 {
     }
     let root = sqrt(max(a * a + (b * b - a * a) * u, 0.0));
     return min(u * (a + b) / max(a + root, MIN_POSITIVE), 1.0);
+}
+
+// The number with which `sample_linear` finds `t`.
+fn linear_share(t: f32, a: f32, b: f32) -> f32 {
+    return select(t, t * (2.0 * a + (b - a) * t) / (a + b), a + b > 0.0);
+}
+
+// The number that `pick` takes for a step and where in it. Twin: transport::steps::Steps::at.
+fn number_at(at: u32, step: u32, rest: f32) -> f32 {
+    return mix(word_f32(at + step), word_f32(at + step + 1u), rest);
 }
 
 // The step of `count` that `u` falls on and where in it; their running sums begin at `at` in `tables`. Twin: transport::steps::Steps::pick.

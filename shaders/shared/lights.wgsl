@@ -3,6 +3,7 @@
 // #include "shared/surface.wgsl"
 // #include "shared/light_tree.wgsl"
 // #include "shared/envmap.wgsl"
+// #include "shared/outlook.wgsl"
 
 // A direction towards an emitter; a pdf of 0 says that there is none.
 struct LightSample {
@@ -35,7 +36,7 @@ fn light_sample(r: Receiver, u: f32, v: vec2<f32>) -> LightSample {
     let place = u * f32(count);
     let choice = min(u32(place), count - 1u);
     if choice < scene.environment_count {
-        return sample_environment(choice, v);
+        return sample_environment(choice, r, v);
     }
     if choice < scene.environment_count + scene.suns {
         var sun = sample_delta(words[scene.sun_list + choice - scene.environment_count], r.p);
@@ -55,11 +56,13 @@ fn light_sample(r: Receiver, u: f32, v: vec2<f32>) -> LightSample {
     return lamp;
 }
 
-fn sample_environment(index: u32, v: vec2<f32>) -> LightSample {
-    var sky = environment_sample(index, v);
+fn sample_environment(index: u32, r: Receiver, v: vec2<f32>) -> LightSample {
+    let drawn = outlook_draw(index, r, v);
+    var sky = environment_sample(index, drawn.v);
+    sky.pdf *= drawn.density;
     if scene.environment_count > 1u {
         sky.radiance = environment(sky.d);
-        sky.pdf = pdf_environment(sky.d) / light_share();
+        sky.pdf = pdf_environment(r, sky.d) / light_share();
     }
     let pdf = sky.pdf * light_share();
     if pdf <= 0.0 {
@@ -107,10 +110,10 @@ fn pdf_surface(r: Receiver, s: Surface) -> f32 {
     return light_share() * light_tree_probability(r, entry) * far * far / (abs(near_at(entry).area) * cosine);
 }
 
-fn pdf_environment(d: vec3<f32>) -> f32 {
+fn pdf_environment(r: Receiver, d: vec3<f32>) -> f32 {
     var sum = 0.0;
     for (var e = 0u; e < scene.environment_count; e++) {
-        sum += environment_pdf(e, d);
+        sum += environment_pdf(e, d) * outlook_density(e, r, d);
     }
     return light_share() * sum;
 }

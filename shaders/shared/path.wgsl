@@ -151,7 +151,7 @@ fn integrate(start: Start, params: PathParams, s: ptr<function, Sampler>) -> vec
         }
         if hit.triangle == NO_TRIANGLE {
             if scene.environment_count > 0u {
-                let other = select(pdf_environment(-wo), 0.0, sample.delta || !NEXT_EVENT);
+                let other = select(pdf_environment(receiver, -wo), 0.0, sample.delta || !NEXT_EVENT);
                 sum += weight * throughput * environment(-wo) * power_heuristic(sample.pdf, other);
             }
             break;

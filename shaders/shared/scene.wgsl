@@ -162,6 +162,8 @@ struct SceneParams {
     light_front: u32,
     light_back: u32,
     light_corners: u32,
+    // Where in `words` it lies what of the environments is seen from where; NONE where that is not known.
+    outlook: u32,
 }
 
 // Kernels begin with a copy, `scene = scene_params`: lavapipe loads a uniform anew wherever it is read, in the innermost loops too.

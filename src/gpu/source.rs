@@ -107,6 +107,7 @@ pub(crate) const FILES: &[(&str, &str)] = files![
     "shared/mirror_light.wgsl",
     "shared/mirror_pass.wgsl",
     "shared/models.wgsl",
+    "shared/outlook.wgsl",
     "shared/path.wgsl",
     "shared/pixel_run.wgsl",
     "shared/principled.wgsl",

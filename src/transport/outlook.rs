@@ -13,19 +13,20 @@ use super::{Sampler, World};
 use crate::base::math::{hash_words, luminance};
 use crate::base::ray::Hit;
 use crate::material::Surface;
+use bytemuck::{Pod, Zeroable};
 use glam::{UVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Parts along either side of the square of numbers.
-const SIDE: usize = 16;
+pub(crate) const SIDE: usize = 16;
 const PARTS: usize = SIDE * SIDE;
 
 /// Cells along the longest side of where the surfaces are.
 const ACROSS: f32 = 16.0;
 
 /// Sides of a cell: normals by their largest component and its sign, and one for receivers on both sides.
-const SIDES: usize = 7;
-const BOTH: usize = 6;
+pub(crate) const SIDES: usize = 7;
+pub(crate) const BOTH: usize = 6;
 
 /// Points on surfaces.
 const POINTS: u32 = 1 << 16;
@@ -47,10 +48,10 @@ const SKY: u32 = 0x736b_7973;
 /// Shares of the parts of each environment, by place.
 #[derive(Debug)]
 pub struct Outlook {
-    grid: Grid,
+    pub(crate) grid: Grid,
     /// For each side of a cell, the first of its `shares`, one an environment; [`NONE`] where there is no surface.
-    which: Vec<u32>,
-    shares: Vec<Shares>,
+    pub(crate) which: Vec<u32>,
+    pub(crate) shares: Vec<Shares>,
     /// How many environments it is of.
     pub environments: usize,
 }
@@ -224,11 +225,16 @@ fn part(v: Vec2) -> usize {
 }
 
 /// Shares of the parts: of the rows, and along each row.
-#[derive(Debug, Clone)]
-struct Shares {
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Shares {
     rows: Edges,
     columns: [Edges; SIDE],
 }
+
+/// Words that the GPU has of one.
+#[cfg(test)]
+pub(crate) const SHARE_WORDS: usize = size_of::<Shares>() / size_of::<u32>();
 
 impl Shares {
     /// By the root of the mean square of what each part brings, which has the least variance; of parts and those beside them together, as
@@ -274,10 +280,11 @@ fn around(squares: &[f32; PARTS], i: usize) -> f32 {
 }
 
 /// Where steps of a distribution begin, as shares of 2^16.
-#[derive(Debug, Clone, Copy)]
+#[repr(transparent)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Edges([u16; SIDE]);
 
-const WHOLE: f32 = 65536.0;
+pub(crate) const WHOLE: f32 = 65536.0;
 
 impl Edges {
     /// Steps in proportion to `shares`, none of which is below a 2000th of all.
@@ -311,10 +318,10 @@ impl Edges {
 
 /// Cubes of space.
 #[derive(Debug)]
-struct Grid {
-    corner: Vec3,
-    per_metre: f32,
-    size: UVec3,
+pub(crate) struct Grid {
+    pub(crate) corner: Vec3,
+    pub(crate) per_metre: f32,
+    pub(crate) size: UVec3,
 }
 
 impl Grid {
@@ -366,8 +373,12 @@ mod tests {
     use glam::Affine3A;
     use std::sync::Arc;
 
-    /// A room of 4 x 4 x 4 metres with walls a centimetre thick but for a hole of a metre in that at +x, under an environment.
     fn room(environment: Emitter) -> World {
+        room_with(environment, 0.5)
+    }
+
+    /// A room of 4 x 4 x 4 metres with a square hole, of so many metres from its middle to its edges, in the wall at +x, under an environment.
+    fn room_with(environment: Emitter, hole: f32) -> World {
         let mut scene = Scene { emitters: vec![environment], ..Scene::default() };
         let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Texture::Constant(Rgb::splat(0.5)) });
         scene.materials.push(Material { name: "wall".into(), bsdf, opacity: None });
@@ -384,13 +395,11 @@ mod tests {
         for (out, a, b) in [(-x, y, z), (y, x, z), (-y, x, z), (z, x, y), (-z, x, y)] {
             wall(out, a, b);
         }
-        for (out, a, b) in [
-            (y * 0.625, y * 0.375, z),
-            (-y * 0.625, y * 0.375, z),
-            (z * 0.625, y * 0.25, z * 0.375),
-            (-z * 0.625, y * 0.25, z * 0.375),
-        ] {
-            wall(x + out, a, b);
+        let (beside, half) = (0.5 + hole / 4.0, 0.5 - hole / 4.0);
+        for (out, a, b) in
+            [(y, y * half, z), (-y, y * half, z), (z, y * (hole / 2.0), z * half), (-z, y * (hole / 2.0), z * half)]
+        {
+            wall(x + out * beside, a, b);
         }
         let (triangles, vertices) = (g.triangles.len() as u32, g.positions.len() as u32);
         g.objects.push(Object {
@@ -457,6 +466,30 @@ mod tests {
             assert!(more > 4.0 * seen, "{more} of the directions are free, {seen} without");
             assert!((same / mean - 1.0).abs() < 0.03, "{same}, not {mean}");
         }
+    }
+
+    #[test]
+    fn a_sun_through_a_small_hole_is_not_starved() {
+        // A window of 30 cm, and a sun of some ten degrees in a dim sky that shines through it onto the floor.
+        let image = (0..64 * 32).map(|i| if i == 9 * 64 + 15 { Rgb::splat(100.0) } else { Rgb::splat(0.1) }).collect();
+        let sky = Emitter::Envmap { image: Arc::new(Image::new(64, 32, image)), scale: 1.0, to_world: Affine3A::IDENTITY };
+        let squares = |world: World| {
+            let mut sum = 0.0;
+            for i in 0..4096 {
+                let [x, y] = [i % 64, i / 64].map(|k| k as f32 / 16.0 - 1.97);
+                let receiver = Receiver { p: Vec3::new(x, -1.999, y), n: Vec3::Y };
+                for k in 0..64 {
+                    let [x, y, choice, _] = Sampler::new(i, k).next_4d();
+                    let light = world.lights.sample(&world.scene, &receiver, choice, Vec2::new(x, y)).unwrap();
+                    if !world.occluded(&crate::base::ray::Ray::new(receiver.p, light.wi)) {
+                        sum += f64::from(luminance(light.weight) * light.wi.y.max(0.0)).powi(2);
+                    }
+                }
+            }
+            sum
+        };
+        let [plain, learned] = [squares(room_with(sky.clone(), 0.15)), squares(room_with(sky, 0.15).with_outlook())];
+        assert!(plain > 0.0 && learned < 0.7 * plain, "mean square {learned}, {plain} by radiance alone");
     }
 
     #[test]

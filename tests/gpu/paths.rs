@@ -118,7 +118,7 @@ pub fn zoo(folder: &std::path::Path) -> World {
 pub fn every_model_and_emitter_is_the_cpus(device: &Device) {
     let gpu = device.gpu();
     let folder = tempfile::tempdir().unwrap();
-    let world = zoo(folder.path());
+    let world = zoo(folder.path()).with_outlook();
     let camera = world.scene.sensor.clone().unwrap();
     let params = PathTraceParams { spp: 8, ..PathTraceParams::default() };
     let scene = Arc::new(GpuScene::new(gpu, &world).unwrap());
@@ -143,12 +143,14 @@ pub fn a_sky_and_its_sun_are_the_cpus(device: &Device) {
         <shape type='sphere'><float name='radius' value='0.7'/><point name='center' x='1' y='0.7' z='1'/><bsdf type='diffuse'/></shape></scene>";
     let file = folder.path().join("sky.xml");
     std::fs::write(&file, text).unwrap();
-    let world = World::new(reprobe::exchange::load(&file, &Default::default()).unwrap());
-    let camera = world.scene.sensor.clone().unwrap();
-    let params = PathTraceParams { spp: 8, ..PathTraceParams::default() };
-    let scene = Arc::new(GpuScene::new(gpu, &world).unwrap());
-    let gpu = PathTracer::new(scene, &params.path, true).unwrap().layers(&camera, params.spp, 1, 0, &Silent).unwrap();
-    check("sky", &gpu, &path_trace(&world, &camera, &params, 1, 0, &Silent), 0.05);
+    let world = || World::new(reprobe::exchange::load(&file, &Default::default()).unwrap());
+    for (what, world) in [("sky", world()), ("what is seen of it", world().with_outlook())] {
+        let camera = world.scene.sensor.clone().unwrap();
+        let params = PathTraceParams { spp: 8, ..PathTraceParams::default() };
+        let scene = Arc::new(GpuScene::new(gpu.clone(), &world).unwrap());
+        let gpu = PathTracer::new(scene, &params.path, true).unwrap().layers(&camera, params.spp, 1, 0, &Silent).unwrap();
+        check(what, &gpu, &path_trace(&world, &camera, &params, 1, 0, &Silent), 0.05);
+    }
 }
 
 pub fn a_model_that_the_gpu_lacks_is_named(device: &Device) {

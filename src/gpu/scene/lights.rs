@@ -7,7 +7,8 @@ use crate::scene::Emitter;
 use crate::transport::World;
 use crate::transport::light_tree::WIDTH;
 use crate::transport::lights::{Environment, Near};
-use bytemuck::{Pod, Zeroable};
+use crate::transport::outlook::Outlook;
+use bytemuck::{Pod, Zeroable, bytes_of, pod_collect_to_vec};
 use glam::{Mat3, Vec3};
 
 /// An emitter, as the constants `EMITTER_...` of scene.wgsl have it.
@@ -70,6 +71,21 @@ pub(crate) struct GpuEnvironment {
     column_sums: u32,
     sines: u32,
     mean: f32,
+}
+
+/// Words before the cells of an outlook.
+pub(crate) const OUTLOOK_HEADER: usize = 8;
+
+/// What of the environments is seen from where, as outlook.wgsl reads it; [`NONE`] where that is not known.
+pub(crate) fn outlook(world: &World, words: &mut Words) -> u32 {
+    let Some(Outlook { grid, which, shares, .. }) = world.lights.outlook.as_deref() else { return NONE };
+    let at = words.floats(grid.corner.to_array());
+    words.floats([grid.per_metre]);
+    words.extend(grid.size.to_array());
+    words.extend([at + (OUTLOOK_HEADER + which.len()) as u32]);
+    words.extend(which.iter().copied());
+    words.extend(shares.iter().flat_map(|shares| pod_collect_to_vec::<u8, u32>(bytes_of(shares))));
+    at
 }
 
 pub(crate) fn emitters(world: &World, textures: &mut Textures, words: &mut Words) -> Vec<GpuEmitter> {

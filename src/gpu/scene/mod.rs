@@ -14,7 +14,7 @@ use crate::scene::Emitter;
 use crate::transport::World;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable, cast_slice};
-use lights::{emitters, environments, near};
+use lights::{emitters, environments, near, outlook};
 use materials::{Models, tilts};
 use shapes::Shapes;
 use std::sync::Arc;
@@ -54,6 +54,7 @@ struct SceneParams {
     light_front: u32,
     light_back: u32,
     light_corners: u32,
+    outlook: u32,
 }
 
 /// The bindings of group 1.
@@ -66,7 +67,7 @@ pub(crate) const BINDINGS: [(&str, Access); 5] = [
 ];
 const PARAMS: StructLayout = layout!(SceneParams as "SceneParams" {
     materials, models, textures, emitters, near, light_nodes, environments, environment_count, has_near, suns, corners, triangles,
-    added, sun_list, sobol, albedo, light_width, light_height, light_front, light_back, light_corners
+    added, sun_list, sobol, albedo, light_width, light_height, light_front, light_back, light_corners, outlook
 });
 /// The structs of scene.wgsl.
 #[cfg_attr(not(test), allow(dead_code, reason = "read by the contract's test"))]
@@ -286,5 +287,6 @@ fn params(world: &World, shapes: &Shapes, records: &mut Records, words: &mut Wor
         light_front: NONE,
         light_back: NONE,
         light_corners: NONE,
+        outlook: outlook(world, words),
     })
 }

@@ -17,7 +17,7 @@ use crate::method::many_light::{
 use crate::method::radiance_probes::{gpu as gpu_radiance_probes, light, seen, shade as shade_of_radiance_probes, volume};
 use crate::method::{image_space_gather, ulr};
 use crate::probe::{neighbors, parameter_map as qhmap};
-use crate::transport::{bvh, light_tree, path, sampler};
+use crate::transport::{bvh, light_tree, outlook, path, sampler};
 use crate::view::{denoise, direct, mirror, mirror_light};
 use std::f32::consts;
 use wgpu::naga::{Expression, Handle, Literal, Module};
@@ -170,6 +170,14 @@ fn twins(file: &str) -> Twins {
             ALBEDO_ALPHAS = albedo::ALPHAS;
         },
         "shared/glossy_direct.wgsl" => twins! { GLOSSY_BRANCH = direct::GLOSSY_BRANCH; },
+        "shared/outlook.wgsl" => twins! {
+            SIDE = outlook::SIDE;
+            SIDES = outlook::SIDES;
+            BOTH = outlook::BOTH;
+            WHOLE = outlook::WHOLE;
+            HEADER = lights::OUTLOOK_HEADER;
+            SHARES = outlook::SHARE_WORDS;
+        },
         "shared/light_tree.wgsl" => twins! {
             BACK = light_tree::BACK;
             EVEN = light_tree::EVEN;
