@@ -165,7 +165,7 @@ pub fn frames_are_the_cpus(device: &Device) {
         // One probe, so that some pixels come from the frame before; sub-pixels, and the kernel with tails.
         ("fine", "--set gather.probes=1 --supersample 2 --set filter.kernel=ggx --set gather.bilinear=nearest"),
         // Memory for hardly more than one probe of the eight.
-        ("small", "--gpu-memory 7M --set gather.albedo_ratio=false --set gather.anchors=3"),
+        ("small", "--gpu-memory 8M --set gather.albedo_ratio=false --set gather.anchors=3"),
         // Rays of the host, weighed against the device's colours.
         ("joined", "--set rays.per_pixel=4 --set rays.window=2"),
     ] {

@@ -11,7 +11,7 @@ pub fn lumigraphs_are_the_cpus(device: &Device) {
         // Fewer probes than a pixel could blend, seen from more sub-pixels.
         ("ulr-few", "--supersample 2 --set probes=3"),
         // Texels that count as hidden where a slant spreads them, hardly worse than the others; memory for a few probes of the eighteen.
-        ("ulr-hidden", "--set blend=2 --set plane_tolerance=0.0001 --set hidden=0.05 --gpu-memory 6M"),
+        ("ulr-hidden", "--set blend=2 --set plane_tolerance=0.0001 --set hidden=0.05 --gpu-memory 7M"),
     ] {
         let (frames, timings) = baked.both(device, name, &format!("--method ulr {options}"));
         for images in &frames {
