@@ -1,4 +1,4 @@
-// Twin of src/method/glossy_probes/filter/four_pass.rs: four_pass.
+// Twin of src/method/glossy_probes/filter/planes.rs: four_pass.
 
 // #include "glossy_probes/filter.wgsl"
 

@@ -12,6 +12,7 @@ pub mod lights;
 mod met;
 pub mod outlook;
 pub mod path;
+mod places;
 mod round_light;
 pub mod sampler;
 mod steps;

@@ -9,6 +9,7 @@
 //! In: a scene's surfaces and environments. Out: for a receiver, the density of the two numbers.
 
 use super::light_tree::Receiver;
+use super::places::{middle_of, side_of};
 use super::{Sampler, World};
 use crate::base::math::{hash_words, luminance};
 use crate::base::ray::Hit;
@@ -325,16 +326,10 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Over all points but the furthest fiftieth on either side of each axis.
-    fn over(mut points: Vec<Vec3>) -> Self {
-        let few = points.len() / 50;
-        let mut ends = [[0.0; 2]; 3];
-        for (k, ends) in ends.iter_mut().enumerate() {
-            points.sort_by(|a, b| a[k].total_cmp(&b[k]));
-            *ends = [points[few][k], points[points.len() - 1 - few][k]];
-        }
-        let corner = Vec3::from(ends.map(|[low, _]| low));
-        let extent = Vec3::from(ends.map(|[low, high]| high - low));
+    /// Over [`middle_of`] points.
+    fn over(points: Vec<Vec3>) -> Self {
+        let [corner, end] = middle_of(points);
+        let extent = end - corner;
         let longest = extent.max_element();
         let per_metre = if longest > 0.0 { ACROSS / longest } else { 0.0 };
         let size = (extent * per_metre).ceil().clamp(Vec3::ONE, Vec3::splat(ACROSS)).as_uvec3();
@@ -345,20 +340,22 @@ impl Grid {
         self.size.element_product() as usize
     }
 
+    fn index(&self, cell: UVec3) -> u32 {
+        (cell.z * self.size.y + cell.y) * self.size.x + cell.x
+    }
+
     /// The side of a cell that a receiver is on.
     fn side(&self, receiver: &Receiver) -> u32 {
         let at = ((receiver.p - self.corner) * self.per_metre).max(Vec3::ZERO).as_uvec3().min(self.size - 1);
-        let n = receiver.n.abs();
-        let axis = if n.x >= n.y && n.x >= n.z { 0 } else { 1 + usize::from(n.z > n.y) };
-        let side = if receiver.n == Vec3::ZERO { BOTH } else { 2 * axis + usize::from(receiver.n[axis] > 0.0) };
-        ((at.z * self.size.y + at.y) * self.size.x + at.x) * SIDES as u32 + side as u32
+        let side = if receiver.n == Vec3::ZERO { BOTH as u32 } else { side_of(receiver.n) };
+        self.index(at) * SIDES as u32 + side
     }
 
     /// The same side of the block that a cell is in, by the block's first cell.
     fn block(&self, side: u32) -> usize {
         let (cell, side) = (side / SIDES as u32, side % SIDES as u32);
         let at = UVec3::new(cell, cell / self.size.x, cell / self.size.x / self.size.y) % self.size / BLOCK * BLOCK;
-        (((at.z * self.size.y + at.y) * self.size.x + at.x) * SIDES as u32 + side) as usize
+        (self.index(at) * SIDES as u32 + side) as usize
     }
 }
 

@@ -10,7 +10,6 @@ use super::gather_params::TILE;
 use super::previous::Previous;
 use super::search::{BestSamples, tile_of};
 use super::shown::Shown;
-use super::whole::covariance;
 use crate::base::math::Rgb;
 use crate::base::simd::Lanes;
 use crate::lightmap::LightMap;
@@ -261,7 +260,7 @@ impl Block {
     fn footprint(&mut self, t: &Tiles, camera: &Camera) {
         let Some(footprint) = t.footprint else { return };
         for ((out, pixel), reflected) in self.covariance.iter_mut().zip(&self.pixels).zip(&self.reflected) {
-            *out = covariance(footprint, camera, pixel, reflected);
+            *out = footprint.of_pixel(camera, pixel, reflected);
         }
     }
 

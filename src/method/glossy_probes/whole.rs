@@ -2,7 +2,6 @@
 //! [`super::tiles`], which leave the same.
 
 use super::filter::{FilterInput, FilterParams, NOT_GLOSSY, filter};
-use super::footprint::{Footprint, GlossyPoint};
 use super::gather::{Gathered, gather};
 use super::tiles::Tiles;
 use crate::base::math::Rgb;
@@ -46,7 +45,7 @@ impl Tiles<'_> {
         unserved.for_each(|(pixel, gathered)| {
             gathered.or_previous(pixel, self.previous);
         });
-        let of = |(pixel, reflected)| self.footprint.map_or([0.0; 3], |f| covariance(f, camera, pixel, reflected));
+        let of = |(pixel, reflected)| self.footprint.map_or([0.0; 3], |f| f.of_pixel(camera, pixel, reflected));
         let covariance = pixels().zip(&reflected).map(of).collect();
         Whole { view, reflected, gathered, covariance }
     }
@@ -64,15 +63,6 @@ impl Whole {
         let curvature = |p: &Option<Pixel>| p.as_ref().map_or([0.0; 2], |p| [p.curvature.k1, p.curvature.k2]);
         Buffers { width: view.size()[0], curvature: view.pixels.iter().map(curvature).collect(), reflected, gathered, covariance }
     }
-}
-
-/// Σ_I of a pixel (Eq. 3): what the probes' reduced roughness lacks, pixels².
-#[inline]
-pub(crate) fn covariance(footprint: &Footprint, camera: &Camera, pixel: &Option<Pixel>, reflected: &Reflected) -> [f32; 3] {
-    let Some((p, alpha)) = pixel.as_ref().and_then(|p| Some((p, p.alpha?))) else { return [0.0; 3] };
-    let (x, n) = (p.surface.p, p.normal);
-    let reflected_distance = reflected.distance_from(x);
-    footprint.covariance(camera, &GlossyPoint { x, n, reflected_distance, alpha, curvature: &p.curvature })
 }
 
 /// The glossy filter (§6.2) over a view's gathered colours.

@@ -3,6 +3,7 @@
 use crate::base::math::{Rgb, floor, hash64};
 use crate::base::octahedral;
 use crate::material::Surface;
+use crate::transport::places::{middle_of, side_of};
 use glam::{DVec3, Vec3, Vec3Swizzles};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -48,26 +49,17 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// A grid over `points`, without the furthest fiftieth on either side.
-    fn over(mut points: Vec<Vec3>) -> Self {
-        let (mut corner, mut longest) = (Vec3::ZERO, 0f32);
-        for k in 0..3 {
-            points.sort_by(|a, b| a[k].total_cmp(&b[k]));
-            let few = points.len() / 50;
-            if let (Some(low), Some(high)) = (points.get(few), points.iter().rev().nth(few)) {
-                corner[k] = low[k];
-                longest = longest.max(high[k] - low[k]);
-            }
-        }
+    /// A grid over [`middle_of`] points.
+    fn over(points: Vec<Vec3>) -> Self {
+        let [corner, end] = middle_of(points);
+        let longest = (end - corner).max_element();
         Self { corner, per_metre: if longest > 0.0 { ACROSS / longest } else { 0.0 } }
     }
 
     fn cell(&self, s: &Surface, wo: Option<Vec3>) -> Cell {
         let p = (s.p - self.corner) * self.per_metre;
         let at = p.to_array().map(|x| (floor(x) + COORDINATES / 2).clamp(0, COORDINATES - 1) as u64);
-        let n = s.frame.n.abs();
-        let axis = if n.x >= n.y && n.x >= n.z { 0 } else { 1 + usize::from(n.z > n.y) };
-        let side = 2 * axis as u64 + u64::from(s.frame.n[axis] > 0.0);
+        let side = side_of(s.frame.n).into();
         Cell { at, side, direction: wo.map_or(0, octahedral_bin), material: u64::from(s.material) }
     }
 }

@@ -5,9 +5,7 @@
 //! *Ours*: a pass steps along the axis nearest its direction and reads the two pixels nearest the line, each with its own range weight. Lanes
 //! hold a step of the lines of eight pixels side by side: most lines are short.
 
-use super::planes::{Guides, Planes};
-use super::{FilterInput, FilterParams, Kernel, NOT_GLOSSY};
-use crate::base::math::Rgb;
+use super::{FilterParams, Kernel, NOT_GLOSSY};
 use crate::base::simd::functions::exp_down;
 use crate::base::simd::lane::{F8, M8, V3};
 use crate::base::simd::{self, Lanes, Simd};
@@ -35,21 +33,21 @@ pub(crate) fn gaussians(kernel: Kernel) -> &'static [(f32, f32)] {
     }
 }
 
-/// Filters a frame.
-pub(super) fn four_pass(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
-    four_pass_by(Lanes::chosen(), input, params)
+/// What stays the same from pass to pass, a pixel an entry.
+pub(super) struct Guides<'a> {
+    /// A pixel's own kernel: [`super::planes::Planes`]'s.
+    pub(super) axes: &'a [[f32; 4]],
+    /// Normal and depth.
+    pub(super) surface: &'a [[f32; 4]],
+    /// [`NOT_GLOSSY`] for none.
+    pub(super) material: &'a [u32],
 }
 
-/// [`four_pass`] in one form of lanes.
-pub(super) fn four_pass_by(lanes: Lanes, input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
-    let mut planes = Planes::default();
-    planes.resize(input.color.len());
-    planes.chunks(input.width).enumerate().for_each(|(y, mut rows)| {
-        (0..input.width).for_each(|x| rows.set(x, Some(&input.entry(y * input.width + x)), params));
-    });
-    let mut color = input.color.to_vec();
-    planes.filter((lanes, input.width), &mut color, params);
-    color
+impl Guides<'_> {
+    /// Bit for bit what came in, where nothing is to be filtered.
+    pub(super) fn is_filtered(&self, i: usize) -> bool {
+        self.material[i] != NOT_GLOSSY && self.axes[i][2] >= MIN_SIGMA * 0.5
+    }
 }
 
 /// One pass: each pixel's value becomes the mean over its line. Weighted colour and weight are carried alike.

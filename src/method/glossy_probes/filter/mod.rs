@@ -1,7 +1,7 @@
 //! The glossy filter: blurs the gathered colours by what the probes lack of the material's roughness.
 //!
 //! *Paper* (§6.2, Eq. 4; §6.3): each pixel a mean of its neighbourhood with the weights Gaussian · range · 1/E, or the same by four passes along
-//! the principal directions of each pixel's covariance ([`four_pass`]).
+//! the principal directions of each pixel's covariance ([`planes`], [`four_pass`]).
 //! *Reading*: the confidence 1/E goes with the colour through the passes and is divided out at the end (normalised convolution, Knutsson and
 //! Westin 1993), so that it counts once; each pass is normalised by its own spatial and range weights.
 //! *Ours*, after measurements: E is not let below [`FilterParams::min_energy`], since one perfect sample must not outshine all others, and zero
@@ -143,7 +143,7 @@ pub fn filter(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
     }
     match params.method {
         Convolution::Full => full(input, params),
-        Convolution::FourPass | Convolution::TwoPass => four_pass::four_pass(input, params),
+        Convolution::FourPass | Convolution::TwoPass => planes::four_pass(input, params),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the one-dimensional passes read and write, a pixel an entry: filled in by the pass before the filter, or from [`super::FilterInput`].
 
-use super::four_pass::{MIN_SIGMA, gaussians, pass};
-use super::{Convolution, FilterParams, NOT_GLOSSY, confidence, principal};
+use super::four_pass::{Guides, gaussians, pass};
+use super::{Convolution, FilterInput, FilterParams, NOT_GLOSSY, confidence, principal};
 use crate::base::math::Rgb;
 use crate::base::simd::Lanes;
 use bytemuck::zeroed_vec;
@@ -38,6 +38,23 @@ pub(crate) struct Entry {
     pub(crate) material: u32,
     pub(crate) covariance: [f32; 3],
     pub(crate) energy: f32,
+}
+
+/// Filters a frame.
+pub(super) fn four_pass(input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
+    four_pass_by(Lanes::chosen(), input, params)
+}
+
+/// [`four_pass`] in one form of lanes.
+pub(super) fn four_pass_by(lanes: Lanes, input: &FilterInput, params: &FilterParams) -> Vec<Rgb> {
+    let mut planes = Planes::default();
+    planes.resize(input.color.len());
+    planes.chunks(input.width).enumerate().for_each(|(y, mut rows)| {
+        (0..input.width).for_each(|x| rows.set(x, Some(&input.entry(y * input.width + x)), params));
+    });
+    let mut color = input.color.to_vec();
+    planes.filter((lanes, input.width), &mut color, params);
+    color
 }
 
 impl Planes {
@@ -127,22 +144,5 @@ impl Rows<'_> {
         self.material[i] = entry.material;
         let w = confidence(entry, params);
         self.from[i] = if w > 0.0 { (entry.color * w).extend(w).to_array() } else { [0.0; 4] };
-    }
-}
-
-/// What stays the same from pass to pass, a pixel an entry.
-pub(super) struct Guides<'a> {
-    /// [`Planes`]'s.
-    pub(super) axes: &'a [[f32; 4]],
-    /// Normal and depth.
-    pub(super) surface: &'a [[f32; 4]],
-    /// [`NOT_GLOSSY`] for none.
-    pub(super) material: &'a [u32],
-}
-
-impl Guides<'_> {
-    /// Bit for bit what came in, where nothing is to be filtered.
-    fn is_filtered(&self, i: usize) -> bool {
-        self.material[i] != NOT_GLOSSY && self.axes[i][2] >= MIN_SIGMA * 0.5
     }
 }

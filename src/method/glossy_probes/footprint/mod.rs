@@ -23,6 +23,8 @@ use crate::base::math::Basis;
 use crate::base::named::within;
 use crate::scene::Camera;
 use crate::surface::Curvature;
+use crate::view::gbuffer::Pixel;
+use crate::view::mirror::Reflected;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -157,6 +159,15 @@ impl Footprint {
         };
         let face = |a: usize| line(a, c) + (line(a, c + 1) - line(a, c)) * fc;
         face(a) + (face(a + 1) - face(a)) * fa
+    }
+
+    /// [`Footprint::covariance`] of what a pixel shows; zero where that is not glossy.
+    #[inline]
+    pub(crate) fn of_pixel(&self, camera: &Camera, pixel: &Option<Pixel>, reflected: &Reflected) -> [f32; 3] {
+        let Some((p, alpha)) = pixel.as_ref().and_then(|p| Some((p, p.alpha?))) else { return [0.0; 3] };
+        let (x, n) = (p.surface.p, p.normal);
+        let reflected_distance = reflected.distance_from(x);
+        self.covariance(camera, &GlossyPoint { x, n, reflected_distance, alpha, curvature: &p.curvature })
     }
 
     /// Covariance `[xx, xy, yy]` of the image filter at a pixel of `camera`, pixels² (Eq. 3). Zero for mirrors.

@@ -46,7 +46,7 @@ const fn kernel(file: &'static str, twin: &'static str, bindings: &'static [(&'s
 /// Weighs the colours by their confidence, and finds each pixel's axes.
 pub(crate) const FILTER_START: KernelSpec = kernel(
     "glossy_probes/filter_start.wgsl",
-    "src/method/glossy_probes/filter/four_pass.rs: four_pass",
+    "src/method/glossy_probes/filter/planes.rs: four_pass",
     &[
         ("filter_params", Uniform),
         ("view", Read),
@@ -65,7 +65,7 @@ pub(crate) const FILTER_PASS: KernelSpec = kernel(
 /// Divides the weights out, and adds one Gaussian's share.
 pub(crate) const FILTER_END: KernelSpec = kernel(
     "glossy_probes/filter_end.wgsl",
-    "src/method/glossy_probes/filter/four_pass.rs: four_pass",
+    "src/method/glossy_probes/filter/planes.rs: four_pass",
     &[("filter_params", Uniform), ("view", Read), ("axes", Read), ("gathered", Read), ("values", Read), ("glossy", ReadWrite)],
 );
 
