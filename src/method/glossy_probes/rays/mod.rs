@@ -9,29 +9,25 @@
 //!
 //! In: a frame's glossy layer from probes, linear. Out: the same, joined.
 
+mod budget;
+mod halves;
+
 use super::lattice::gaussian;
 use crate::base::clock::Clock;
-use crate::base::math::{Rgb, hash_words, luminance};
+use crate::base::math::{Rgb, luminance};
 use crate::base::named::within;
 use crate::lightmap::LightMap;
-use crate::material::Surface;
 use crate::scene::Camera;
-use crate::transport::path::{PathParams, scattered};
-use crate::transport::{Sampler, World};
+use crate::transport::World;
 use crate::view::denoiser::Denoiser;
-use crate::view::gbuffer::{GLOSSY, is_glossy};
 use crate::{Error, Result};
-use glam::{Vec2, Vec3};
+use glam::Vec2;
+use halves::{Lit, halves};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Marks the random numbers of these rays.
-const RAYS: u32 = 0x7261_7973;
 /// Most rays a pixel.
 const MOST_RAYS: u32 = 1 << 12;
-/// Rays that leave a surface for one that a camera ray has met, from so many rays a pixel on.
-const OF_ONE: u32 = 2;
-const MANY: u32 = 8;
 /// Luminance that is added to a pixel's before squares are divided by it, in units of the layer's geometric mean: what is darker counts as if it
 /// were so bright.
 const FLOOR: f32 = 0.2;
@@ -42,8 +38,10 @@ const PRIOR: f32 = 0.005;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RaysParams {
-    /// Rays a pixel; 0 leaves the probes alone. *Paper*: 0.
+    /// Rays a pixel in the mean over those that show something glossy; 0 leaves the probes alone. *Paper*: 0.
     pub per_pixel: u32,
+    /// Share of them that is spread evenly, 0 to 1; the rest goes where these are the noisiest, at most twice `per_pixel` to a pixel.
+    pub even: f32,
     /// Rays in a row, the first included.
     pub bounces: u32,
     /// Standard deviation of the window in which both are weighed, pixels.
@@ -52,7 +50,7 @@ pub struct RaysParams {
 
 impl Default for RaysParams {
     fn default() -> Self {
-        Self { per_pixel: 0, bounces: 3, window: 4.0 }
+        Self { per_pixel: 0, even: 0.5, bounces: 3, window: 4.0 }
     }
 }
 
@@ -63,6 +61,7 @@ impl RaysParams {
         if self.per_pixel == 1 {
             return Err(Error::Request("rays.per_pixel=1: expected 0, or 2 and more: half of them judges the others".into()));
         }
+        within("rays.even", self.even, 0.0..=1.0)?;
         within("rays.bounces", self.bounces, 1..=MOST_RAYS)?;
         within("rays.window", self.window, 0.5..=256.0)
     }
@@ -89,7 +88,8 @@ pub fn joined(
     clock: &mut Clock,
 ) -> Result<Vec<Rgb>> {
     let width = shot.camera.size[0] as usize;
-    let halves = halves(world, lightmap, shot, params);
+    let shown = Shown::of(probes, width);
+    let halves = halves(Lit { world, lightmap }, shot, (probes, &shown), params);
     clock.lap("rays");
     let estimates = match denoiser {
         None => halves.clone(),
@@ -101,10 +101,30 @@ pub fn joined(
             denoised
         }
     };
-    let weights = weights(probes, &halves, &estimates, (width, params.window));
+    let weights = weights(probes, &halves, &estimates, (&shown, params.window));
     let layer = (0..probes.len()).map(|i| probes[i] + (mean(&estimates, i) - probes[i]) * weights[i]).collect();
     clock.lap("join");
     Ok(layer)
+}
+
+/// What a layer is like as a whole.
+struct Shown {
+    /// Pixels a row.
+    width: usize,
+    /// Luminance that is added to a pixel's before it divides.
+    floor: f32,
+}
+
+impl Shown {
+    fn of(probes: &[Rgb], width: usize) -> Self {
+        let lights = || probes.iter().map(|&c| luminance(c)).filter(|&y| y > 0.0);
+        Self { width, floor: FLOOR * (lights().map(f32::ln).sum::<f32>() / lights().count().max(1) as f32).exp() }
+    }
+
+    /// What squares of differences of the light of a pixel, `a` and `b` by two estimates, are worth: one over a power of its luminance.
+    fn scale(&self, a: Rgb, b: Rgb, power: f32) -> f32 {
+        (luminance(a) + luminance(b) + self.floor).powf(-power)
+    }
 }
 
 /// What both halves say of a pixel together.
@@ -112,48 +132,18 @@ fn mean(estimates: &[Vec<Rgb>; 2], i: usize) -> Rgb {
     0.5 * (estimates[0][i] + estimates[1][i])
 }
 
-/// Means of each half of the rays of every pixel. Halves have no camera ray in common.
-fn halves(world: &World, lightmap: &LightMap, Shot { camera, seeds: [seed, frame] }: Shot, params: &RaysParams) -> [Vec<Rgb>; 2] {
-    let [width, height] = camera.size;
-    let path = PathParams::of_rays(params.bounces);
-    let known = |s: &Surface, wo: Vec3| lightmap.diffuse_radiance(&world.scene, s, wo);
-    let rays = params.per_pixel;
-    let of_one = if rays < MANY { 1 } else { OF_ONE };
-    let pixel = |i: u32| {
-        let [to_pixel, from_surface] = [0, 1].map(|k| hash_words(&[seed, frame, RAYS, i, k]));
-        let mut sums = [(Rgb::ZERO, 0); 2];
-        for first in (0..rays).step_by(of_one as usize) {
-            let (sum, count) = &mut sums[(first / of_one) as usize % 2];
-            let these = first..rays.min(first + of_one);
-            *count += these.len();
-            let ray = camera.drawn_ray(i, Sampler::new(to_pixel, first / of_one).next_4d());
-            let Some(surface) = world.seen(&ray).filter(|s| is_glossy(world, s, -ray.d)) else { continue };
-            for number in these {
-                let mut sampler = Sampler::new(from_surface, number);
-                *sum += scattered(world, &surface, -ray.d, GLOSSY, Some(&known), &path, &mut sampler);
-            }
-        }
-        let [a, b] = sums.map(|(sum, count)| sum / count as f32);
-        (a, b)
-    };
-    let (a, b) = (0..width * height).into_par_iter().with_min_len(width as usize).map(pixel).unzip();
-    [a, b]
-}
-
 /// What the mean of the rays' estimates, one of each half, weighs at each pixel, 0 to 1.
-fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 2], (width, window): (usize, f32)) -> Vec<f32> {
-    let lights = || probes.iter().map(|&c| luminance(c)).filter(|&y| y > 0.0);
-    let floor = FLOOR * (lights().map(f32::ln).sum::<f32>() / lights().count().max(1) as f32).exp();
+fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 2], (shown, window): (&Shown, f32)) -> Vec<f32> {
     let term = |i: usize| {
         let (p, m) = (probes[i], mean(estimates, i));
-        let scale = (luminance(p) + luminance(m) + floor).powi(-2);
+        let scale = shown.scale(p, m, 2.0);
         let along = |of: usize, by: usize| (estimates[of][i] - p).dot(halves[by][i] - p);
         let term = Vec2::new(along(0, 1) + along(1, 0), 2.0 * (m - p).length_squared()) * scale;
         if term.is_finite() { term } else { Vec2::ZERO }
     };
-    let terms: Vec<Vec2> = (0..probes.len()).into_par_iter().with_min_len(width.max(1)).map(term).collect();
+    let terms: Vec<Vec2> = (0..probes.len()).into_par_iter().with_min_len(shown.width.max(1)).map(term).collect();
     let weight = |sum: Vec2| ((sum.x + 0.5 * PRIOR) / (sum.y + PRIOR)).clamp(0.0, 1.0);
-    blurred(&terms, width, window).into_iter().map(weight).collect()
+    blurred(&terms, shown.width, window).into_iter().map(weight).collect()
 }
 
 /// Gaussian sums of an image; what lies outside of it is zero.
@@ -176,6 +166,8 @@ fn blurred(image: &[Vec2], width: usize, sigma: f32) -> Vec<Vec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::math::hash_words;
+    use crate::transport::Sampler;
 
     const WIDTH: usize = 192;
     const COUNT: usize = WIDTH * 96;
@@ -208,7 +200,7 @@ mod tests {
     fn noisy_rays_weigh_what_wiener_would_give_them_and_nothing_where_probes_are_right() {
         let bias = 0.3;
         let (probes, halves) = picture(bias);
-        let weights = weights(&probes, &halves, &halves, (WIDTH, 8.0));
+        let weights = weights(&probes, &halves, &halves, (&Shown::of(&probes, WIDTH), 8.0));
         let [left, right] = sides(&weights);
         // The mean of both has half of a half's variance: b² / (b² + σ² / 2).
         let wiener = bias * bias / (bias * bias + NOISE * NOISE / 2.0);
@@ -222,7 +214,7 @@ mod tests {
         let bias = 0.3;
         let (probes, halves) = picture(bias);
         let clean = || vec![Rgb::ONE; COUNT];
-        let [left, right] = sides(&weights(&probes, &halves, &[clean(), clean()], (WIDTH, 8.0)));
+        let [left, right] = sides(&weights(&probes, &halves, &[clean(), clean()], (&Shown::of(&probes, WIDTH), 8.0)));
         // All of it, but for what the prior holds back: squares of three channels and two halves, relative to the sum of both and the floor.
         let squares = 6.0 * bias * bias / (2.0 + bias + FLOOR * (1.0 + bias).sqrt()).powi(2);
         let expected = (squares + 0.5 * PRIOR) / (squares + PRIOR);
@@ -234,7 +226,7 @@ mod tests {
     fn what_is_no_number_does_not_spread() {
         let (mut probes, halves) = picture(0.3);
         probes[50 * WIDTH + 50] = Rgb::splat(f32::NAN);
-        let weights = weights(&probes, &halves, &halves, (WIDTH, 8.0));
+        let weights = weights(&probes, &halves, &halves, (&Shown::of(&probes, WIDTH), 8.0));
         assert!(weights.iter().all(|w| w.is_finite()));
     }
 
