@@ -72,8 +72,6 @@ impl Preset {
             Self::Medium => Settings {
                 probes: 64,
                 probe_size: Size([512, 256]),
-                spp: 128,
-                lightmap_spp: 128,
                 lightmap_error: Some(0.15),
                 lightmap_texels: 1_000_000,
                 size: Some(Size([480, 270])),
