@@ -6,6 +6,7 @@
 //! tells it. The rays' estimate is the mean M of what the halves say, each denoised by itself, and in a window w M + (1 - w) P, with P from the probes, is nearest to the
 //! truth T for w = Σ (M - P)·(T - P) / Σ |M - P|². In the mean, a half of the rays as it is, R, stands for T, with what the other half, which it has no part in,
 //! gives to M: Σ (M - P)·(T - P) = Σ ½ [(X₁ - P)·(R₂ - P) + (X₂ - P)·(R₁ - P)]. No threshold chooses, so that there is no border to see.
+//! Some rays are spread evenly (`halves`), the rest goes where these are noisy (`budget`).
 //!
 //! In: a frame's glossy layer from probes, linear. Out: the same, joined.
 
