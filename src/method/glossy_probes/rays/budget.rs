@@ -7,7 +7,7 @@
 //! In: the rays so far. Out: how many each pixel has in the end.
 
 use super::halves::Sums;
-use super::{Shown, blurred};
+use super::{Level, blurred};
 use crate::base::math::Rgb;
 use glam::Vec2;
 use rayon::prelude::*;
@@ -23,15 +23,15 @@ const STEPS: u32 = 40;
 
 /// Rays each pixel has in the end, even numbers, never fewer than `sums` has of it: `per_pixel` in the mean over those that show something glossy, and of all
 /// others as many as before.
-pub(super) fn allotted(probes: &[Rgb], sums: &[Sums], shown: &Shown, per_pixel: u32) -> Vec<u32> {
+pub(super) fn allotted(probes: &[Rgb], sums: &[Sums], level: &Level, per_pixel: u32) -> Vec<u32> {
     // Of what is glossy, and what that weighs.
     let variance = |i: usize| {
-        let variance = sums[i].variance() * shown.scale(probes[i], sums[i].mean(), RELATIVE_TO);
+        let variance = sums[i].variance() * level.scale(probes[i], sums[i].mean(), RELATIVE_TO);
         if sums[i].is_glossy() && variance.is_finite() { Vec2::new(variance, 1.0) } else { Vec2::ZERO }
     };
     let variances: Vec<Vec2> = (0..sums.len()).into_par_iter().map(variance).collect();
     let sigma: Vec<f32> =
-        blurred(&variances, shown.width, WINDOW).into_iter().map(|v| (v.x / v.y.max(f32::MIN_POSITIVE)).sqrt()).collect();
+        blurred(&variances, level.width, WINDOW).into_iter().map(|v| (v.x / v.y.max(f32::MIN_POSITIVE)).sqrt()).collect();
     let most = MOST * per_pixel as f32;
     let count = |i: usize, of_sigma: f32| {
         let so_far = sums[i].count();
@@ -67,7 +67,7 @@ mod tests {
             let mut sums = Sums::default();
             for k in 0..SO_FAR {
                 let light = Rgb::splat(1.0 + sigma(i % WIDTH) * if k % 4 < 2 { 1.0 } else { -1.0 });
-                sums.add(k, (i >= 8 * WIDTH).then_some(light));
+                sums.add((i >= 8 * WIDTH).then_some(light));
             }
             sums
         };
@@ -76,7 +76,7 @@ mod tests {
 
     fn counts(sigma: impl Fn(usize) -> f32, per_pixel: u32) -> Vec<u32> {
         let probes = vec![Rgb::ONE; COUNT];
-        allotted(&probes, &pixels(sigma), &Shown::of(&probes, WIDTH), per_pixel)
+        allotted(&probes, &pixels(sigma), &Level::of(&probes, WIDTH), per_pixel)
     }
 
     fn mean(counts: &[u32]) -> f64 {
@@ -114,9 +114,9 @@ mod tests {
     #[test]
     fn what_is_no_number_gets_no_more() {
         let mut sums = pixels(|_| 0.2);
-        sums[24 * WIDTH + 48].add(0, Some(Rgb::splat(f32::NAN)));
+        sums[24 * WIDTH + 48].add(Some(Rgb::splat(f32::NAN)));
         let probes = vec![Rgb::ONE; COUNT];
-        let counts = allotted(&probes, &sums, &Shown::of(&probes, WIDTH), 16);
+        let counts = allotted(&probes, &sums, &Level::of(&probes, WIDTH), 16);
         assert!(counts.iter().all(|&n| n <= 32));
     }
 }

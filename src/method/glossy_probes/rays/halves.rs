@@ -3,8 +3,7 @@
 //!
 //! In: a camera, and the light map that lights what the rays meet. Out: the light of either half, and how far single rays differ.
 
-use super::budget::allotted;
-use super::{RaysParams, Shot, Shown};
+use super::Shot;
 use crate::base::math::{Rgb, hash_words, luminance};
 use crate::lightmap::LightMap;
 use crate::material::Surface;
@@ -16,25 +15,23 @@ use rayon::prelude::*;
 
 /// Marks the random numbers of these rays.
 const RAYS: u32 = 0x7261_7973;
-/// Fewest rays a pixel that tell how many more it takes.
-const TELLING: u32 = 4;
 
-/// A pixel's rays.
+/// A pixel's rays, of the halves in turns.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sums {
     /// Light of either half.
     light: [Rgb; 2],
-    counts: [u32; 2],
+    count: u32,
     /// Of squared luminance.
     squares: f32,
     is_glossy: bool,
 }
 
 impl Sums {
-    /// Adds ray `number`, with the light that a glossy surface scatters; `None` where there is none.
-    pub fn add(&mut self, number: u32, light: Option<Rgb>) {
-        let half = (number % 2) as usize;
-        self.counts[half] += 1;
+    /// Adds the next ray, with the light that a glossy surface scatters; `None` where there is none.
+    pub fn add(&mut self, light: Option<Rgb>) {
+        let half = (self.count % 2) as usize;
+        self.count += 1;
         let Some(light) = light else { return };
         self.light[half] += light;
         self.squares += luminance(light).powi(2);
@@ -43,7 +40,7 @@ impl Sums {
 
     /// Rays so far.
     pub fn count(&self) -> u32 {
-        self.counts.iter().sum()
+        self.count
     }
 
     /// Whether one of them has met something glossy.
@@ -52,19 +49,19 @@ impl Sums {
     }
 
     /// Mean of either half.
-    fn means(&self) -> (Rgb, Rgb) {
-        let [a, b] = [0, 1].map(|half| self.light[half] / self.counts[half].max(1) as f32);
-        (a, b)
+    pub fn means(&self) -> (Rgb, Rgb) {
+        let [a, b] = self.light;
+        (a / self.count.div_ceil(2).max(1) as f32, b / (self.count / 2).max(1) as f32)
     }
 
     /// Mean of all.
     pub fn mean(&self) -> Rgb {
-        (self.light[0] + self.light[1]) / self.count().max(1) as f32
+        (self.light[0] + self.light[1]) / self.count.max(1) as f32
     }
 
     /// Variance of a single ray's luminance.
     pub fn variance(&self) -> f32 {
-        let (n, mean) = (self.count() as f32, luminance(self.mean()));
+        let (n, mean) = (self.count as f32, luminance(self.mean()));
         (self.squares - n * mean * mean).max(0.0) / (n - 1.0).max(1.0)
     }
 }
@@ -76,27 +73,15 @@ pub(super) struct Lit<'a> {
     pub lightmap: &'a LightMap,
 }
 
-/// Means of each half of the rays of every pixel: some spread evenly, the rest as [`allotted`].
-pub(super) fn halves(lit: Lit, shot: Shot, (probes, shown): (&[Rgb], &Shown), params: &RaysParams) -> [Vec<Rgb>; 2] {
-    let evenly = (2 * (0.5 * params.even * params.per_pixel as f32).round() as u32).max(TELLING).min(params.per_pixel);
-    let mut sums = vec![Sums::default(); probes.len()];
-    follow(lit, shot, params, &mut sums, |_| evenly);
-    if evenly < params.per_pixel {
-        let counts = allotted(probes, &sums, shown, params.per_pixel);
-        follow(lit, shot, params, &mut sums, |i| counts[i]);
-    }
-    sums.iter().map(Sums::means).unzip::<_, _, Vec<_>, Vec<_>>().into()
-}
-
 /// Follows the rays of every pixel that are missing `until` it has so many.
-fn follow(
+pub(super) fn follow(
     Lit { world, lightmap }: Lit,
     Shot { camera, seeds: [seed, frame] }: Shot,
-    params: &RaysParams,
+    bounces: u32,
     sums: &mut [Sums],
     until: impl Fn(usize) -> u32 + Sync,
 ) {
-    let path = PathParams::of_rays(params.bounces);
+    let path = PathParams::of_rays(bounces);
     let known = |s: &Surface, wo: Vec3| lightmap.diffuse_radiance(&world.scene, s, wo);
     let ray = |i: u32, number: u32| {
         let [to_pixel, from_surface] = [0, 1].map(|k| hash_words(&[seed, frame, RAYS, i, 2 * (number % 2) + k]));
@@ -106,8 +91,8 @@ fn follow(
         Some(scattered(world, &surface, -ray.d, GLOSSY, Some(&known), &path, &mut sampler))
     };
     let pixel = |(i, sums): (usize, &mut Sums)| {
-        for number in sums.count()..until(i) {
-            sums.add(number, ray(i as u32, number));
+        for number in sums.count..until(i) {
+            sums.add(ray(i as u32, number));
         }
     };
     sums.par_iter_mut().enumerate().with_min_len(camera.size[0] as usize).for_each(pixel);

@@ -22,13 +22,16 @@ use crate::scene::Camera;
 use crate::transport::World;
 use crate::view::denoiser::Denoiser;
 use crate::{Error, Result};
+use budget::allotted;
 use glam::Vec2;
-use halves::{Lit, halves};
+use halves::{Lit, Sums, follow};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Most rays a pixel.
 const MOST_RAYS: u32 = 1 << 12;
+/// Fewest rays a pixel that tell how many more it takes.
+const TELLING: u32 = 4;
 /// Luminance that is added to a pixel's before squares are divided by it, in units of the layer's geometric mean: what is darker counts as if it
 /// were so bright.
 const FLOOR: f32 = 0.2;
@@ -89,8 +92,8 @@ pub fn joined(
     clock: &mut Clock,
 ) -> Result<Vec<Rgb>> {
     let width = shot.camera.size[0] as usize;
-    let shown = Shown::of(probes, width);
-    let halves = halves(Lit { world, lightmap }, shot, (probes, &shown), params);
+    let level = Level::of(probes, width);
+    let halves = halves(Lit { world, lightmap }, shot, (probes, &level), params);
     clock.lap("rays");
     let estimates = match denoiser {
         None => halves.clone(),
@@ -102,21 +105,33 @@ pub fn joined(
             denoised
         }
     };
-    let weights = weights(probes, &halves, &estimates, (&shown, params.window));
+    let weights = weights(probes, &halves, &estimates, (&level, params.window));
     let layer = (0..probes.len()).map(|i| probes[i] + (mean(&estimates, i) - probes[i]) * weights[i]).collect();
     clock.lap("join");
     Ok(layer)
 }
 
+/// Means of each half of the rays of every pixel: some spread evenly, the rest as [`allotted`].
+fn halves(lit: Lit, shot: Shot, (probes, level): (&[Rgb], &Level), params: &RaysParams) -> [Vec<Rgb>; 2] {
+    let evenly = (2 * (0.5 * params.even * params.per_pixel as f32).round() as u32).max(TELLING).min(params.per_pixel);
+    let mut sums = vec![Sums::default(); probes.len()];
+    follow(lit, shot, params.bounces, &mut sums, |_| evenly);
+    if evenly < params.per_pixel {
+        let counts = allotted(probes, &sums, level, params.per_pixel);
+        follow(lit, shot, params.bounces, &mut sums, |i| counts[i]);
+    }
+    sums.iter().map(Sums::means).unzip::<_, _, Vec<_>, Vec<_>>().into()
+}
+
 /// What a layer is like as a whole.
-struct Shown {
+struct Level {
     /// Pixels a row.
     width: usize,
     /// Luminance that is added to a pixel's before it divides.
     floor: f32,
 }
 
-impl Shown {
+impl Level {
     fn of(probes: &[Rgb], width: usize) -> Self {
         let lights = || probes.iter().map(|&c| luminance(c)).filter(|&y| y > 0.0);
         Self { width, floor: FLOOR * (lights().map(f32::ln).sum::<f32>() / lights().count().max(1) as f32).exp() }
@@ -134,17 +149,17 @@ fn mean(estimates: &[Vec<Rgb>; 2], i: usize) -> Rgb {
 }
 
 /// What the mean of the rays' estimates, one of each half, weighs at each pixel, 0 to 1.
-fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 2], (shown, window): (&Shown, f32)) -> Vec<f32> {
+fn weights(probes: &[Rgb], halves: &[Vec<Rgb>; 2], estimates: &[Vec<Rgb>; 2], (level, window): (&Level, f32)) -> Vec<f32> {
     let term = |i: usize| {
         let (p, m) = (probes[i], mean(estimates, i));
-        let scale = shown.scale(p, m, 2.0);
+        let scale = level.scale(p, m, 2.0);
         let along = |of: usize, by: usize| (estimates[of][i] - p).dot(halves[by][i] - p);
         let term = Vec2::new(along(0, 1) + along(1, 0), 2.0 * (m - p).length_squared()) * scale;
         if term.is_finite() { term } else { Vec2::ZERO }
     };
-    let terms: Vec<Vec2> = (0..probes.len()).into_par_iter().with_min_len(shown.width.max(1)).map(term).collect();
+    let terms: Vec<Vec2> = (0..probes.len()).into_par_iter().with_min_len(level.width.max(1)).map(term).collect();
     let weight = |sum: Vec2| ((sum.x + 0.5 * PRIOR) / (sum.y + PRIOR)).clamp(0.0, 1.0);
-    blurred(&terms, shown.width, window).into_iter().map(weight).collect()
+    blurred(&terms, level.width, window).into_iter().map(weight).collect()
 }
 
 /// Gaussian sums of an image; what lies outside of it is zero.
@@ -201,7 +216,7 @@ mod tests {
     fn noisy_rays_weigh_what_wiener_would_give_them_and_nothing_where_probes_are_right() {
         let bias = 0.3;
         let (probes, halves) = picture(bias);
-        let weights = weights(&probes, &halves, &halves, (&Shown::of(&probes, WIDTH), 8.0));
+        let weights = weights(&probes, &halves, &halves, (&Level::of(&probes, WIDTH), 8.0));
         let [left, right] = sides(&weights);
         // The mean of both has half of a half's variance: b² / (b² + σ² / 2).
         let wiener = bias * bias / (bias * bias + NOISE * NOISE / 2.0);
@@ -215,7 +230,7 @@ mod tests {
         let bias = 0.3;
         let (probes, halves) = picture(bias);
         let clean = || vec![Rgb::ONE; COUNT];
-        let [left, right] = sides(&weights(&probes, &halves, &[clean(), clean()], (&Shown::of(&probes, WIDTH), 8.0)));
+        let [left, right] = sides(&weights(&probes, &halves, &[clean(), clean()], (&Level::of(&probes, WIDTH), 8.0)));
         // All of it, but for what the prior holds back: squares of three channels and two halves, relative to the sum of both and the floor.
         let squares = 6.0 * bias * bias / (2.0 + bias + FLOOR * (1.0 + bias).sqrt()).powi(2);
         let expected = (squares + 0.5 * PRIOR) / (squares + PRIOR);
@@ -227,7 +242,7 @@ mod tests {
     fn what_is_no_number_does_not_spread() {
         let (mut probes, halves) = picture(0.3);
         probes[50 * WIDTH + 50] = Rgb::splat(f32::NAN);
-        let weights = weights(&probes, &halves, &halves, (&Shown::of(&probes, WIDTH), 8.0));
+        let weights = weights(&probes, &halves, &halves, (&Level::of(&probes, WIDTH), 8.0));
         assert!(weights.iter().all(|w| w.is_finite()));
     }
 
