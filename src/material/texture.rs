@@ -159,27 +159,24 @@ impl Bitmap {
             return Rgb::ZERO;
         }
         let [width, height] = [self.image.width as i64, self.image.height as i64];
-        let column = |x: i64| self.wrap.index(x, width);
-        let row = |y: i64| self.wrap.index(y, height);
         let p = uv * Vec2::new(width as f32, height as f32);
         if self.nearest {
-            return self.image.pixel(column(floor(p.x)), row(floor(p.y))) * self.scale;
+            return self.image.pixel(self.wrap.index(floor(p.x), width), self.wrap.index(floor(p.y), height)) * self.scale;
         }
         let p = p - 0.5;
         let (x, y) = (floor(p.x), floor(p.y));
         let t = p - Vec2::new(x as f32, y as f32);
-        let (x, y) = ([column(x), column(x.saturating_add(1))], [row(y), row(y.saturating_add(1))]);
-        let across = |y: usize| self.image.pixel(x[0], y) * (1.0 - t.x) + self.image.pixel(x[1], y) * t.x;
-        (across(y[0]) * (1.0 - t.y) + across(y[1]) * t.y) * self.scale
+        let [upper, lower] = self.image.four(self.wrap.two(x, width), self.wrap.two(y, height));
+        let across = |[left, right]: [Rgb; 2]| left * (1.0 - t.x) + right * t.x;
+        (across(upper) * (1.0 - t.y) + across(lower) * t.y) * self.scale
     }
 
     /// Tells the caches what [`Bitmap::eval`] will read.
     fn prefetch(&self, uv: Vec2) {
         let p = self.to_uv.transform_point2(uv) * Vec2::new(self.image.width as f32, self.image.height as f32) - 0.5;
         let x = self.wrap.index(floor(p.x), self.image.width as i64);
-        let y = floor(p.y);
-        for row in [y, y.saturating_add(1)] {
-            self.image.prefetch(x, self.wrap.index(row, self.image.height as i64));
+        for row in self.wrap.two(floor(p.y), self.image.height as i64) {
+            self.image.prefetch(x, row);
         }
     }
 
@@ -192,11 +189,23 @@ impl Bitmap {
 }
 
 impl Wrap {
-    /// The pixel that stands for the pixel `i` of an endless row, of `n` that there are.
-    fn index(self, i: i64, n: i64) -> usize {
-        if (0..n).contains(&i) {
-            return i as usize;
+    /// [`Wrap::index`] of a pixel and of the next.
+    #[inline]
+    fn two(self, i: i64, n: i64) -> [usize; 2] {
+        if (0..n - 1).contains(&i) {
+            return [i as usize, i as usize + 1];
         }
+        [self.index(i, n), self.index(i.saturating_add(1), n)]
+    }
+
+    /// The pixel that stands for the pixel `i` of an endless row, of `n` that there are.
+    #[inline]
+    fn index(self, i: i64, n: i64) -> usize {
+        if (0..n).contains(&i) { i as usize } else { self.wrapped(i, n) }
+    }
+
+    #[inline(never)]
+    fn wrapped(self, i: i64, n: i64) -> usize {
         let wrapped = match self {
             Self::Clamp => i.clamp(0, n - 1),
             Self::Repeat => i.rem_euclid(n),

@@ -13,7 +13,7 @@ use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
-use crate::material::bsdf::{Bsdf, BsdfSample, Lobes, Query};
+use crate::material::bsdf::{At, Bsdf, BsdfSample, Lobes, Query};
 use crate::scene::Scene;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
@@ -118,8 +118,7 @@ pub fn scattered(
     params: &PathParams,
     sampler: &mut Sampler,
 ) -> Rgb {
-    let measure = Measure::Scattering { wi: surface.frame.to_local(wo_world), query };
-    integrate(&Vertex { world, surface, measure }, known, params, sampler)
+    integrate(&Vertex::scattering(world, surface, wo_world, query), receiver(world, surface, wo_world), known, params, sampler)
 }
 
 /// Incident, not scattered light: one sample of the light map's quantity ∫ T_in(ω) L(ω) cos θ dω at `surface`, on the side of
@@ -132,8 +131,9 @@ pub fn transmitted_irradiance(
     params: &PathParams,
     sampler: &mut Sampler,
 ) -> Rgb {
-    let measure = Measure::Irradiance { side: if back { -1.0 } else { 1.0 } };
-    integrate(&Vertex { world, surface, measure }, known, params, sampler)
+    let side = if back { -1.0 } else { 1.0 };
+    let from = Receiver { p: surface.p, n: surface.frame.n * side };
+    integrate(&Vertex { world, surface, measure: Measure::Irradiance { side } }, from, known, params, sampler)
 }
 
 /// Ambient occlusion: one sample of ∫ V(ω) cos θ / π dω over the hemisphere of `frame.n`, or of its back, where V is 1 if nothing is met
@@ -201,19 +201,18 @@ pub(super) fn keep_finite(c: Rgb) -> Rgb {
 }
 
 /// What incident radiance is integrated against at a vertex.
-#[derive(Clone, Copy)]
-pub(super) enum Measure {
-    /// BSDF times cosine, seen from the local direction `wi`.
-    Scattering { wi: Vec3, query: Query },
+enum Measure<'a> {
+    /// BSDF times cosine.
+    Scattering(At<'a>),
     /// Transmission into the diffuse layer times cosine, on the side of the frame's normal (1) or behind it (-1).
     Irradiance { side: f32 },
 }
 
 /// A point of a path where light arrives.
 pub(super) struct Vertex<'a> {
-    pub(super) world: &'a World,
-    pub(super) surface: &'a Surface,
-    pub(super) measure: Measure,
+    world: &'a World,
+    surface: &'a Surface,
+    measure: Measure<'a>,
 }
 
 /// A ray of a path and how it was found.
@@ -230,22 +229,21 @@ struct Start {
 }
 
 /// One sample of the integral of incident radiance at the first vertex of a path.
-fn integrate(vertex: &Vertex, known: Option<KnownDiffuse>, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+fn integrate(vertex: &Vertex, from: Receiver, known: Option<KnownDiffuse>, params: &PathParams, sampler: &mut Sampler) -> Rgb {
+    let world = vertex.world;
     if params.max_depth == 0 {
         return Rgb::ZERO;
     }
-    let [light_x, light_y, light_choice, _] = sampler.next_4d();
-    let [x, y, lobe, _] = sampler.next_4d();
-    let from = vertex.receiver();
-    let mut sum = vertex.direct(&from, light_choice, Vec2::new(light_x, light_y));
+    let [[light_x, light_y, light_choice, _], [x, y, lobe, _]] = sampler.next_two_4d();
+    let mut sum = vertex.direct(world.light(&from, light_choice, Vec2::new(light_x, light_y)));
     // Direct light alone, and no ray could meet any.
-    if params.max_depth == 1 && vertex.world.lights.never_met {
+    if params.max_depth == 1 && world.lights.never_met {
         return keep_finite(sum);
     }
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
         let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
         let start = Start { ray, from, found: Found { pdf: sample.pdf, delta: sample.delta }, eta: sample.eta, depth: 1 };
-        sum += sample.weight * incident(vertex.world, start, known, params, sampler);
+        sum += sample.weight * incident(world, start, known, params, sampler);
     }
     keep_finite(sum)
 }
@@ -257,7 +255,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
     let mut throughput = Rgb::ONE;
     loop {
         // Drawn before the ray is cast, so that tables can be fetched while it is under way.
-        let [light_x, light_y, light_choice, live] = sampler.next_4d();
+        let [[light_x, light_y, light_choice, live], [x, y, lobe, _]] = sampler.next_two_4d();
         world.lights.prefetch(light_choice, Vec2::new(light_x, light_y));
         let Some(surface) = world.intersect(&ray) else {
             let (light, weight) = environment_met(world, ray.d, &from, found);
@@ -281,11 +279,11 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
                 return sum;
             }
         }
-        let [x, y, lobe, _] = sampler.next_4d();
-        let measure = Measure::Scattering { wi: surface.frame.to_local(wo), query };
-        let vertex = Vertex { world, surface: &surface, measure };
-        from = vertex.receiver();
-        sum += throughput * vertex.direct(&from, light_choice, Vec2::new(light_x, light_y));
+        from = receiver(world, &surface, wo);
+        // Before the textures are read, which have been asked for only now.
+        let light = world.light(&from, light_choice, Vec2::new(light_x, light_y));
+        let vertex = Vertex::scattering(world, &surface, wo, query);
+        sum += throughput * vertex.direct(light);
         let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) else { return sum };
         throughput *= sample.weight;
         eta *= sample.eta;
@@ -307,28 +305,30 @@ pub(super) fn survival(throughput: Rgb, eta: f32) -> f32 {
     (throughput.max_element() * eta * eta * ROULETTE_MERCY).min(ROULETTE_CAP)
 }
 
-impl Vertex<'_> {
+/// Where a surface that scatters light to `wo` sees emitters from: on the viewer's side, or on both where light passes through it.
+pub(super) fn receiver(world: &World, surface: &Surface, wo: Vec3) -> Receiver {
+    let n = surface.frame.n;
+    let both = world.scene.materials[surface.material as usize].bsdf.is_transmissive();
+    Receiver { p: surface.p, n: n * if both { 0.0 } else { 1f32.copysign(n.dot(wo)) } }
+}
+
+impl<'a> Vertex<'a> {
+    /// Where light is scattered to `wo` (unit, world, away from the surface).
+    pub(super) fn scattering(world: &'a World, surface: &'a Surface, wo: Vec3, query: Query) -> Self {
+        let at = world.scene.materials[surface.material as usize].bsdf.at(surface, surface.frame.to_local(wo), query);
+        Self { world, surface, measure: Measure::Scattering(at) }
+    }
+
     fn bsdf(&self) -> &Bsdf {
         &self.world.scene.materials[self.surface.material as usize].bsdf
     }
 
-    /// Where the emitters are seen from.
-    pub(super) fn receiver(&self) -> Receiver {
-        let side = match self.measure {
-            Measure::Scattering { .. } if self.bsdf().is_transmissive() => 0.0,
-            Measure::Scattering { wi, .. } => 1f32.copysign(wi.z),
-            Measure::Irradiance { side } => side,
-        };
-        Receiver { p: self.surface.p, n: self.surface.frame.n * side }
-    }
-
-    /// Next-event estimation: light straight from an emitter, weighted against finding it by [`Vertex::sample`].
-    pub(super) fn direct(&self, receiver: &Receiver, choice: f32, v: Vec2) -> Rgb {
-        let world = self.world;
-        let Some(light) = world.lights.sample(&world.scene, receiver, choice, v) else { return Rgb::ZERO };
+    /// Next-event estimation: what light straight from an emitter comes to, weighted against finding it by [`Vertex::sample`].
+    pub(super) fn direct(&self, light: Option<LightSample>) -> Rgb {
+        let Some(light) = light else { return Rgb::ZERO };
         let wo = self.surface.frame.to_local(light.wi);
         let (value, pdf) = self.eval_pdf(wo);
-        if value == Rgb::ZERO || light.weight == Rgb::ZERO || world.occluded(&self.shadow_ray(&light)) {
+        if value == Rgb::ZERO || light.weight == Rgb::ZERO || self.world.occluded(&self.shadow_ray(&light)) {
             return Rgb::ZERO;
         }
         light.weight * value * power_heuristic(light.pdf, if light.delta { 0.0 } else { pdf })
@@ -341,9 +341,9 @@ impl Vertex<'_> {
     /// What radiance from the local direction `wo` is multiplied with, cosine included, and the density (solid angle) with
     /// which [`Vertex::sample`] finds it.
     fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
-        match self.measure {
-            Measure::Scattering { wi, query } => self.bsdf().eval_pdf(self.surface, wi, wo, query),
-            Measure::Irradiance { side } if wo.z * side > 0.0 => {
+        match &self.measure {
+            Measure::Scattering(at) => at.eval_pdf(wo),
+            &Measure::Irradiance { side } if wo.z * side > 0.0 => {
                 let cos = wo.z * side;
                 (Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * cos), cos * FRAC_1_PI)
             }
@@ -353,11 +353,9 @@ impl Vertex<'_> {
 
     /// Draws a local direction; its weight is the value of [`Vertex::eval_pdf`] over the density.
     pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
-        match self.measure {
-            Measure::Scattering { wi, query } => {
-                self.bsdf().sample(self.surface, wi, u, v, query).filter(|s| s.weight != Rgb::ZERO)
-            }
-            Measure::Irradiance { side } => {
+        match &self.measure {
+            Measure::Scattering(at) => at.sample(u, v).filter(|s| s.weight != Rgb::ZERO),
+            &Measure::Irradiance { side } => {
                 let (sin_phi, cos_phi) = (v.x * TAU).sin_cos();
                 let (cos, sin) = ((1.0 - v.y).sqrt(), v.y.sqrt());
                 let wo = Vec3::new(sin * cos_phi, sin * sin_phi, cos * side);

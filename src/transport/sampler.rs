@@ -6,8 +6,9 @@
 //! hashes, which cost a third.
 
 use crate::base::math::{hash_words, hash64, unit};
+use crate::base::simd::{Kernel, Lanes, Simd};
 use glam::Vec2;
-use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
+use sobol_burley::parts::{hash, owen_scramble_rev, sobol_int4_rev};
 use std::sync::LazyLock;
 
 /// Sets of four dimensions that are Sobol points; later ones are hashes. Four path vertices.
@@ -37,19 +38,33 @@ impl Sampler {
 
     /// The next set of four dimensions, each in [0, 1); what is left of the set before is passed over.
     pub fn next_4d(&mut self) -> [f32; 4] {
-        self.used = 4;
-        let set = self.set;
-        self.set += 1;
+        self.skip_4d();
+        let set = self.set - 1;
         if set < SOBOL_SETS {
-            // The sequence ends at 2^16: longer ones go on with another scramble.
-            let seed = self.stream ^ (self.index >> 16).wrapping_mul(0x85eb_ca6b);
-            sobol_4d(self.index & 0xffff, seed.wrapping_add(set.wrapping_mul(0x9e37_79b9)))
+            self.sobol([set; 2])[0]
         } else {
             let key = (u64::from(self.stream) << 32 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let first = hash64(key ^ hash64(u64::from(set)));
             let second = hash64(first.wrapping_add(0x9e37_79b9_7f4a_7c15));
             [first, first >> 32, second, second >> 32].map(|bits| unit(bits as u32))
         }
+    }
+
+    /// The next two sets, for little more than one of them: a path's vertex takes two.
+    pub fn next_two_4d(&mut self) -> [[f32; 4]; 2] {
+        let set = self.set;
+        if set + 1 >= SOBOL_SETS {
+            return [self.next_4d(), self.next_4d()];
+        }
+        (self.used, self.set) = (4, set + 2);
+        self.sobol([set, set + 1])
+    }
+
+    fn sobol(&self, sets: [u32; 2]) -> [[f32; 4]; 2] {
+        // The sequence ends at 2^16: longer ones go on with another scramble.
+        let seed = self.stream ^ (self.index >> 16).wrapping_mul(0x85eb_ca6b);
+        let seeds = sets.map(|set| seed.wrapping_add(set.wrapping_mul(0x9e37_79b9)));
+        Lanes::chosen().run(Sobol { index: self.index & 0xffff, seeds })
     }
 
     /// Passes over a set of four dimensions, as if it had been drawn.
@@ -80,17 +95,76 @@ impl Sampler {
 }
 
 /// The first four dimensions by each of the four nibbles of an index of 16 bits, its bits reversed: a point is the sum of four of these, without carry.
-static NIBBLES: LazyLock<[[Int4; 16]; 4]> =
-    LazyLock::new(|| [28, 24, 20, 16].map(|shift| std::array::from_fn(|nibble| sobol_int4_rev((nibble as u32) << shift, 0))));
+static NIBBLES: LazyLock<Nibbles> = LazyLock::new(|| {
+    let point = |bits: u32| bytemuck::cast::<[u32; 4], u128>(sobol_int4_rev(bits, 0).into());
+    [28, 24, 20, 16].map(|shift| std::array::from_fn(|nibble| point((nibble as u32) << shift)))
+});
 
-/// `sobol_burley::sample_4d` of dimension set 0, which goes through the index bit by bit: the same numbers.
-fn sobol_4d(index: u32, seed: u32) -> [f32; 4] {
-    let shuffled = owen_scramble_rev(index.reverse_bits(), hash(seed ^ 0x79c6_8e4a));
-    let [a, b, c, d] = &*NIBBLES;
-    let of = |table: &[Int4; 16], shift: u32| table[(shuffled >> shift & 15) as usize];
-    let point = of(a, 28) ^ of(b, 24) ^ of(c, 20) ^ of(d, 16);
-    let scramble = Int4::from([seed.wrapping_mul(0x9c8f_2d3b); 4]) ^ [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8].into();
-    owen_scramble_int4_rev(point, hash_int4(scramble)).reverse_bits().to_f32_norm()
+/// Four numbers of 32 bits each, as they lie in memory.
+type Nibbles = [[u128; 16]; 4];
+
+/// `sobol_burley::sample_4d` of dimension set 0 under two seeds, side by side: the same numbers.
+struct Sobol {
+    /// Below 2^16.
+    index: u32,
+    seeds: [u32; 2],
+}
+
+impl Kernel for Sobol {
+    type Output = [[f32; 4]; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> [[f32; 4]; 2] {
+        let [a, b] = self.seeds;
+        let (index, nibbles) = (self.index.reverse_bits(), &*NIBBLES);
+        let shuffled = |seed: u32| owen_scramble_rev(index, hash(seed ^ 0x79c6_8e4a));
+        let points = s.load_ids(&bytemuck::cast([point(nibbles, shuffled(a)), point(nibbles, shuffled(b))]));
+        let seeds = s.mul_ids(s.load_ids(&[a, a, a, a, b, b, b, b]), s.splat_ids(0x9c8f_2d3b));
+        let axes = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8, 0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
+        let bits = reversed(s, owen_scrambled(s, points, hashed(s, s.xor_ids(seeds, s.load_ids(&axes)))));
+        let one = s.add_ids(s.shift_down::<9>(bits), s.splat_ids(1f32.to_bits()));
+        let mut numbers = [0.0; 8];
+        s.store(s.sub(s.of_bits(one), s.splat(1.0)), &mut numbers);
+        let [p0, p1, p2, p3, q0, q1, q2, q3] = numbers;
+        [[p0, p1, p2, p3], [q0, q1, q2, q3]]
+    }
+}
+
+/// The first four dimensions of a shuffled index, all bits reversed.
+#[inline(always)]
+fn point([a, b, c, d]: &Nibbles, shuffled: u32) -> u128 {
+    let nibble = |shift: u32| (shuffled >> shift & 15) as usize;
+    a[nibble(28)] ^ b[nibble(24)] ^ c[nibble(20)] ^ d[nibble(16)]
+}
+
+/// [`owen_scramble_rev`], eight at a time.
+#[inline(always)]
+fn owen_scrambled<S: Simd>(s: S, n: S::I, scramble: S::I) -> S::I {
+    let times = |n: S::I, factor: u32| s.xor_ids(n, s.mul_ids(n, s.splat_ids(factor)));
+    // The upper half, made odd.
+    let factor = s.add_ids(s.and_ids(s.shift_down::<16>(scramble), s.splat_ids(0xfffe)), s.splat_ids(1));
+    let n = s.mul_ids(s.add_ids(times(n, 0x3d20_adea), scramble), factor);
+    times(times(n, 0x0552_6c56), 0x53a2_2864)
+}
+
+/// [`hash`], eight at a time.
+#[inline(always)]
+fn hashed<S: Simd>(s: S, n: S::I) -> S::I {
+    let n = s.xor_ids(n, s.splat_ids(0xe6fe_3beb));
+    let n = s.mul_ids(s.xor_ids(n, s.shift_down::<16>(n)), s.splat_ids(0x7feb_352d));
+    let n = s.mul_ids(s.xor_ids(n, s.shift_down::<15>(n)), s.splat_ids(0x846c_a68b));
+    s.xor_ids(n, s.shift_down::<16>(n))
+}
+
+/// The bits of each number in reverse: neighbours swap places, then pairs, fours, bytes and halves.
+#[inline(always)]
+fn reversed<S: Simd>(s: S, n: S::I) -> S::I {
+    let of = |n: S::I, mask: u32| s.and_ids(n, s.splat_ids(mask));
+    let n = s.add_ids(of(s.shift_down::<1>(n), 0x5555_5555), s.shift_up::<1>(of(n, 0x5555_5555)));
+    let n = s.add_ids(of(s.shift_down::<2>(n), 0x3333_3333), s.shift_up::<2>(of(n, 0x3333_3333)));
+    let n = s.add_ids(of(s.shift_down::<4>(n), 0x0f0f_0f0f), s.shift_up::<4>(of(n, 0x0f0f_0f0f)));
+    let n = s.add_ids(of(s.shift_down::<8>(n), 0x00ff_00ff), s.shift_up::<8>(of(n, 0x00ff_00ff)));
+    s.add_ids(s.shift_down::<16>(n), s.shift_up::<16>(n))
 }
 
 #[cfg(test)]
@@ -101,7 +175,20 @@ mod tests {
     fn points_are_those_of_the_library() {
         for index in (0..1 << 16).step_by(7) {
             let seed = hash_words(&[index]);
-            assert_eq!(sobol_4d(index, seed), sobol_burley::sample_4d(index, 0, seed), "index {index}");
+            let expected = [seed, !seed].map(|seed| sobol_burley::sample_4d(index, 0, seed));
+            for lanes in Lanes::all() {
+                assert_eq!(lanes.run(Sobol { index, seeds: [seed, !seed] }), expected, "index {index}, {}", lanes.name());
+            }
+        }
+    }
+
+    #[test]
+    fn two_sets_at_once_are_one_and_the_next() {
+        let [mut alone, mut together] = [Sampler::new(7, 5), Sampler::new(7, 5)];
+        alone.next_4d();
+        together.next_4d();
+        for _ in 0..SOBOL_SETS {
+            assert_eq!(together.next_two_4d(), [alone.next_4d(), alone.next_4d()]);
         }
     }
 

@@ -2,13 +2,15 @@
 
 use super::bvh::{BEAM, Bvh};
 use super::facet::Facet;
+use super::light_sample::LightSample;
+use super::light_tree::Receiver;
 use super::lights::Lights;
 use super::outlook::Outlook;
 use crate::base::math::Rgb;
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
 use crate::scene::{Animation, Scene};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -131,6 +133,12 @@ impl World {
         }
         surface.t += way;
         Some(surface)
+    }
+
+    /// Draws an emitter for a receiver, and a direction to it: [`Lights::sample`].
+    #[inline]
+    pub(crate) fn light(&self, receiver: &Receiver, choice: f32, v: Vec2) -> Option<LightSample> {
+        self.lights.sample(&self.scene, receiver, choice, v)
     }
 
     /// Radiance of the environment as a camera's ray in direction `d` shows it.

@@ -117,6 +117,8 @@ pub trait Simd: Copy {
     fn mul_ids(self, a: Self::I, b: Self::I) -> Self::I;
     /// a and b, bit by bit.
     fn and_ids(self, a: Self::I, b: Self::I) -> Self::I;
+    /// a or b but not both, bit by bit.
+    fn xor_ids(self, a: Self::I, b: Self::I) -> Self::I;
     /// a times two to the power of `BITS`.
     fn shift_up<const BITS: i32>(self, a: Self::I) -> Self::I;
     /// The upper bits.

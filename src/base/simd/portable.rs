@@ -169,6 +169,10 @@ impl Simd for Portable {
         std::array::from_fn(|i| a[i] & b[i])
     }
     #[inline(always)]
+    fn xor_ids(self, a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        std::array::from_fn(|i| a[i] ^ b[i])
+    }
+    #[inline(always)]
     fn shift_up<const BITS: i32>(self, a: [u32; 8]) -> [u32; 8] {
         a.map(|a| a << BITS)
     }

@@ -130,6 +130,10 @@ macro_rules! common {
             unsafe { _mm256_and_si256(a, b) }
         }
         #[inline(always)]
+        fn xor_ids(self, a: __m256i, b: __m256i) -> __m256i {
+            unsafe { _mm256_xor_si256(a, b) }
+        }
+        #[inline(always)]
         fn shift_up<const BITS: i32>(self, a: __m256i) -> __m256i {
             unsafe { _mm256_slli_epi32::<BITS>(a) }
         }

@@ -1,6 +1,6 @@
 //! A linear mix of two models (Mitsuba's `blendbsdf`).
 
-use super::{Bsdf, BsdfSample, Lobes, Query, Scatter, Surface, scalar};
+use super::{At, Bsdf, BsdfSample, Lobes, Model, Query, Scatter, Surface, scalar};
 use crate::base::math::Rgb;
 use crate::material::{Opacity, Texture};
 use glam::{Vec2, Vec3};
@@ -50,29 +50,48 @@ impl Blend {
     }
 }
 
-impl Scatter for Blend {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        let share = self.share_of_b(s);
-        let p = self.probability_of_b(share, query);
-        let (value_a, pdf_a) = self.a.eval_pdf(s, wi, wo, query);
-        let (value_b, pdf_b) = self.b.eval_pdf(s, wi, wo, query);
+/// A mix at a point. What is within is asked anew each time.
+#[derive(Clone, Copy)]
+pub(super) struct BlendAt<'a> {
+    model: &'a Blend,
+    s: &'a Surface,
+    wi: Vec3,
+    query: Query,
+    /// Of `b`.
+    share: f32,
+    /// Of drawing from `b`.
+    probability: f32,
+}
+
+impl BlendAt<'_> {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
+        let (share, p) = (self.share, self.probability);
+        let (value_a, pdf_a) = self.model.a.eval_pdf(self.s, self.wi, wo, self.query);
+        let (value_b, pdf_b) = self.model.b.eval_pdf(self.s, self.wi, wo, self.query);
         (value_a * (1.0 - share) + value_b * share, pdf_a * (1.0 - p) + pdf_b * p)
     }
 
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        let share = self.share_of_b(s);
-        let p = self.probability_of_b(share, query);
+    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+        let (share, p) = (self.share, self.probability);
         let (sample, share, p) = if u < p {
-            (self.b.sample(s, wi, u / p, v, query)?, share, p)
+            (self.model.b.sample(self.s, self.wi, u / p, v, self.query)?, share, p)
         } else {
-            (self.a.sample(s, wi, (u - p) / (1.0 - p), v, query)?, 1.0 - share, 1.0 - p)
+            (self.model.a.sample(self.s, self.wi, (u - p) / (1.0 - p), v, self.query)?, 1.0 - share, 1.0 - p)
         };
         if sample.delta {
             return Some(BsdfSample { weight: sample.weight * (share / p), pdf: sample.pdf * p, ..sample });
         }
-        let (value, pdf) = self.eval_pdf(s, wi, sample.wo, query);
+        let (value, pdf) = self.eval_pdf(sample.wo);
         let mixed = BsdfSample::reflected(sample.wo, value / pdf, pdf)?;
         Some(BsdfSample { eta: sample.eta, ..mixed })
+    }
+}
+
+impl Scatter for Blend {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let share = self.share_of_b(s);
+        let probability = self.probability_of_b(share, query);
+        At::some(Some(BlendAt { model: self, s, wi, query, share, probability }), Model::Blend)
     }
 
     fn lobes(&self) -> Lobes {

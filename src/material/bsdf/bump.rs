@@ -7,7 +7,7 @@
 //! *Ours*: the tilted tangent is the surface's, turned. Mitsuba 3.9.1's `bumpmap` mixes world and local coordinates
 //! there (its `normalmap` does not), which shows for anisotropic models alone.
 
-use super::{Bsdf, BsdfSample, Lobes, Query, Scatter, Surface};
+use super::{At, Bsdf, BsdfSample, Lobes, Model, Query, Scatter, Surface};
 use crate::base::math::{Basis, Rgb, luminance};
 use crate::material::Texture;
 use glam::{Vec2, Vec3};
@@ -67,12 +67,10 @@ impl Tilted for NormalMap {
     }
 }
 
-/// The tilted frame as one viewer sees it.
+/// The tilted frame as one viewer sees it, in the surface's shading frame.
+#[derive(Clone, Copy)]
 struct Tilt {
-    /// The frame, in the surface's shading frame.
     local: Basis,
-    /// The surface with the tilted frame for its own.
-    surface: Surface,
 }
 
 impl Tilt {
@@ -82,10 +80,13 @@ impl Tilt {
             n = Vec3::new(-n.x, -n.y, n.z);
         }
         let n = n.try_normalize().unwrap_or(Vec3::Z);
-        let local = Basis::from_normal_and_tangent(n, Vec3::X);
-        let f = s.frame;
-        let frame = Basis { s: f.to_world(local.s), t: f.to_world(local.t), n: f.to_world(local.n) };
-        Self { local, surface: Surface { frame, ..*s } }
+        Self { local: Basis::from_normal_and_tangent(n, Vec3::X) }
+    }
+
+    /// The surface with the tilted frame for its own.
+    fn surface(&self, s: &Surface) -> Surface {
+        let (f, local) = (s.frame, self.local);
+        Surface { frame: Basis { s: f.to_world(local.s), t: f.to_world(local.t), n: f.to_world(local.n) }, ..*s }
     }
 
     /// The viewer's direction in the tilted frame.
@@ -109,19 +110,35 @@ impl Tilt {
     }
 }
 
-impl<T: Tilted> Scatter for T {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        let tilt = Tilt::new(self, s, wi);
-        let Some((light, lit)) = tilt.light(wo) else { return (Rgb::ZERO, 0.0) };
-        let (value, pdf) = self.nested().eval_pdf(&tilt.surface, tilt.view(wi), light, query);
+/// A model in a tilted frame at a point. What is within is asked anew each time.
+#[derive(Clone, Copy)]
+pub(super) struct TiltedAt<'a> {
+    tilt: Tilt,
+    nested: &'a Bsdf,
+    s: &'a Surface,
+    /// The viewer's direction in the tilted frame.
+    view: Vec3,
+    query: Query,
+}
+
+impl TiltedAt<'_> {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
+        let Some((light, lit)) = self.tilt.light(wo) else { return (Rgb::ZERO, 0.0) };
+        let (value, pdf) = self.nested.eval_pdf(&self.tilt.surface(self.s), self.view, light, self.query);
         (value * lit, pdf)
     }
 
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
+    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+        let sample = self.nested.sample(&self.tilt.surface(self.s), self.view, u, v, self.query)?;
+        let wo = self.tilt.local.to_world(sample.wo);
+        (sample.wo.z * wo.z > 0.0).then(|| BsdfSample { wo, weight: sample.weight * self.tilt.shadowing(wo), ..sample })
+    }
+}
+
+impl<T: Tilted> Scatter for T {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
         let tilt = Tilt::new(self, s, wi);
-        let sample = self.nested().sample(&tilt.surface, tilt.view(wi), u, v, query)?;
-        let wo = tilt.local.to_world(sample.wo);
-        (sample.wo.z * wo.z > 0.0).then(|| BsdfSample { wo, weight: sample.weight * tilt.shadowing(wo), ..sample })
+        At::some(Some(TiltedAt { tilt, nested: self.nested(), s, view: tilt.view(wi), query }), Model::Tilted)
     }
 
     fn lobes(&self) -> Lobes {
@@ -130,7 +147,7 @@ impl<T: Tilted> Scatter for T {
 
     fn diffuse_out(&self, s: &Surface, wi: Vec3) -> Rgb {
         let tilt = Tilt::new(self, s, wi);
-        self.nested().diffuse_out(&tilt.surface, tilt.view(wi))
+        self.nested().diffuse_out(&tilt.surface(s), tilt.view(wi))
     }
 
     /// For a viewer above the surface; with the ratio of the tilted cosine to the surface's own, which the light map has.
@@ -138,17 +155,17 @@ impl<T: Tilted> Scatter for T {
     fn diffuse_in(&self, s: &Surface, wo: Vec3) -> f32 {
         let tilt = Tilt::new(self, s, Vec3::Z.with_z(1f32.copysign(wo.z)));
         let Some((light, lit)) = tilt.light(wo) else { return 0.0 };
-        self.nested().diffuse_in(&tilt.surface, light) * lit * (light.z / wo.z)
+        self.nested().diffuse_in(&tilt.surface(s), light) * lit * (light.z / wo.z)
     }
 
     fn diffuse_albedo(&self, s: &Surface, wi: Vec3) -> Rgb {
         let tilt = Tilt::new(self, s, wi);
-        self.nested().diffuse_albedo(&tilt.surface, tilt.view(wi))
+        self.nested().diffuse_albedo(&tilt.surface(s), tilt.view(wi))
     }
 
     fn glossy_albedo(&self, s: &Surface, wi: Vec3, query: Query) -> Rgb {
         let tilt = Tilt::new(self, s, wi);
-        self.nested().glossy_albedo(&tilt.surface, tilt.view(wi), query)
+        self.nested().glossy_albedo(&tilt.surface(s), tilt.view(wi), query)
     }
 
     fn alpha(&self, s: &Surface) -> Option<f32> {

@@ -2,7 +2,7 @@
 
 use super::albedo::lobe_albedo;
 use super::microfacet::{Distribution, Microfacets};
-use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, scalar};
+use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface, fresnel, scalar};
 use crate::base::math::{Rgb, reflect};
 use crate::material::Texture;
 use glam::{Vec2, Vec3};
@@ -18,16 +18,24 @@ pub struct Conductor {
     pub specular_reflectance: Texture,
 }
 
-impl Scatter for Conductor {
-    fn eval_pdf(&self, _s: &Surface, _wi: Vec3, _wo: Vec3, _query: Query) -> (Rgb, f32) {
-        (Rgb::ZERO, 0.0)
-    }
+/// The model at a point, seen from above.
+#[derive(Clone, Copy)]
+pub(super) struct ConductorAt<'a> {
+    model: &'a Conductor,
+    s: &'a Surface,
+    wi: Vec3,
+}
 
-    fn sample(&self, s: &Surface, wi: Vec3, _u: f32, _v: Vec2, query: Query) -> Option<BsdfSample> {
-        if wi.z <= 0.0 || !query.lobes.contains(Lobes::NON_DIFFUSE) {
-            return None;
-        }
-        Some(BsdfSample::mirrored(wi, self.glossy_albedo(s, wi, query), 1.0))
+impl ConductorAt<'_> {
+    pub(super) fn sample(&self) -> BsdfSample {
+        BsdfSample::mirrored(self.wi, self.model.glossy_albedo(self.s, self.wi, Query::default()), 1.0)
+    }
+}
+
+impl Scatter for Conductor {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = wi.z > 0.0 && query.lobes.contains(Lobes::NON_DIFFUSE);
+        At::some(seen.then_some(ConductorAt { model: self, s, wi }), Model::Conductor)
     }
 
     fn lobes(&self) -> Lobes {
@@ -70,30 +78,50 @@ impl RoughConductor {
     }
 }
 
-impl Scatter for RoughConductor {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        if wi.z <= 0.0 || wo.z <= 0.0 || !query.lobes.contains(Lobes::NON_DIFFUSE) {
-            return (Rgb::ZERO, 0.0);
-        }
-        let facets = self.facets(s, query);
-        let m = (wi + wo).normalize_or_zero();
-        let pdf = 0.25 * facets.d(m) * facets.g1_over_cos(wi, m);
-        (self.fresnel(s, wi.dot(m)) * (pdf * facets.g1(wo, m)), pdf)
+/// The model at a point, seen from above.
+#[derive(Clone, Copy)]
+pub(super) struct RoughConductorAt<'a> {
+    metal: &'a Conductor,
+    wi: Vec3,
+    facets: Microfacets,
+    /// What multiplies the Fresnel term.
+    specular: Rgb,
+}
+
+impl RoughConductorAt<'_> {
+    fn fresnel(&self, m: Vec3) -> Rgb {
+        self.specular * fresnel::conductor(self.wi.dot(m), self.metal.eta, self.metal.k)
     }
 
-    fn sample(&self, s: &Surface, wi: Vec3, _u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        if wi.z <= 0.0 || !query.lobes.contains(Lobes::NON_DIFFUSE) {
-            return None;
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
+        if wo.z <= 0.0 {
+            return (Rgb::ZERO, 0.0);
         }
-        let facets = self.facets(s, query);
+        let (wi, facets) = (self.wi, &self.facets);
+        let m = (wi + wo).normalize_or_zero();
+        let pdf = 0.25 * facets.d(m) * facets.g1_over_cos(wi, m);
+        (self.fresnel(m) * (pdf * facets.g1(wo, m)), pdf)
+    }
+
+    pub(super) fn sample(&self, v: Vec2) -> Option<BsdfSample> {
+        let (wi, facets) = (self.wi, &self.facets);
         let m = facets.sample(wi, v);
         let wo = reflect(wi, m).normalize_or_zero();
         if wo.z <= 0.0 {
             return None;
         }
         // D and G1(wi) of value and density cancel.
-        let weight = self.fresnel(s, wi.dot(m)) * facets.g1(wo, m);
+        let weight = self.fresnel(m) * facets.g1(wo, m);
         BsdfSample::reflected(wo, weight, 0.25 * facets.d(m) * facets.g1_over_cos(wi, m))
+    }
+}
+
+impl Scatter for RoughConductor {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = wi.z > 0.0 && query.lobes.contains(Lobes::NON_DIFFUSE);
+        let specular = || self.metal.specular_reflectance.at(s);
+        let at = || RoughConductorAt { metal: &self.metal, wi, facets: self.facets(s, query), specular: specular() };
+        At::some(seen.then(at), Model::RoughConductor)
     }
 
     fn lobes(&self) -> Lobes {

@@ -1,10 +1,10 @@
 //! Smooth dielectrics: an interface and a thin sheet (Mitsuba's `dielectric` and `thindielectric`).
 
-use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio};
+use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface, fresnel, positive_ratio};
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::material::Texture;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// What the dielectrics share in a scene file.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -42,23 +42,32 @@ impl Dielectric {
     }
 }
 
-impl Scatter for Dielectric {
-    fn eval_pdf(&self, _s: &Surface, _wi: Vec3, _wo: Vec3, _query: Query) -> (Rgb, f32) {
-        (Rgb::ZERO, 0.0)
-    }
+/// The model at a point, seen from either side.
+#[derive(Clone, Copy)]
+pub(super) struct DielectricAt<'a> {
+    model: &'a Dielectric,
+    s: &'a Surface,
+    wi: Vec3,
+}
 
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, _v: Vec2, query: Query) -> Option<BsdfSample> {
-        if !query.lobes.contains(Lobes::NON_DIFFUSE) || wi.z == 0.0 {
-            return None;
-        }
-        let f = fresnel::dielectric(wi.z, self.eta);
+impl DielectricAt<'_> {
+    pub(super) fn sample(&self, u: f32) -> BsdfSample {
+        let (wi, params) = (self.wi, &self.model.params);
+        let f = fresnel::dielectric(wi.z, self.model.eta);
         if u < f.r {
-            return Some(BsdfSample::mirrored(wi, self.params.specular_reflectance.at(s), f.r));
+            return BsdfSample::mirrored(wi, params.specular_reflectance.at(self.s), f.r);
         }
         // Radiance is compressed by the squared ratio of the indices.
-        let weight = self.params.specular_transmittance.at(s) * (f.eta_ti * f.eta_ti);
+        let weight = params.specular_transmittance.at(self.s) * (f.eta_ti * f.eta_ti);
         let wo = fresnel::refract(wi, Vec3::Z, &f);
-        Some(BsdfSample { wo, weight, pdf: 1.0 - f.r, delta: true, eta: f.eta_it })
+        BsdfSample { wo, weight, pdf: 1.0 - f.r, delta: true, eta: f.eta_it }
+    }
+}
+
+impl Scatter for Dielectric {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = wi.z != 0.0 && query.lobes.contains(Lobes::NON_DIFFUSE);
+        At::some(seen.then_some(DielectricAt { model: self, s, wi }), Model::Dielectric)
     }
 
     fn lobes(&self) -> Lobes {
@@ -100,22 +109,29 @@ impl ThinDielectric {
     }
 }
 
-impl Scatter for ThinDielectric {
-    fn eval_pdf(&self, _s: &Surface, _wi: Vec3, _wo: Vec3, _query: Query) -> (Rgb, f32) {
-        (Rgb::ZERO, 0.0)
-    }
+/// The model at a point, seen from either side.
+#[derive(Clone, Copy)]
+pub(super) struct ThinDielectricAt<'a> {
+    model: &'a ThinDielectric,
+    s: &'a Surface,
+    wi: Vec3,
+}
 
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, _v: Vec2, query: Query) -> Option<BsdfSample> {
-        if !query.lobes.contains(Lobes::NON_DIFFUSE) || wi.z == 0.0 {
-            return None;
+impl ThinDielectricAt<'_> {
+    pub(super) fn sample(&self, u: f32) -> BsdfSample {
+        let r = self.model.reflected(self.wi);
+        if u < r {
+            return BsdfSample::mirrored(self.wi, self.model.params.specular_reflectance.at(self.s), r);
         }
-        let r = self.reflected(wi);
-        Some(if u < r {
-            BsdfSample::mirrored(wi, self.params.specular_reflectance.at(s), r)
-        } else {
-            let weight = self.params.specular_transmittance.at(s);
-            BsdfSample { wo: -wi, weight, pdf: 1.0 - r, delta: true, eta: 1.0 }
-        })
+        let weight = self.model.params.specular_transmittance.at(self.s);
+        BsdfSample { wo: -self.wi, weight, pdf: 1.0 - r, delta: true, eta: 1.0 }
+    }
+}
+
+impl Scatter for ThinDielectric {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = wi.z != 0.0 && query.lobes.contains(Lobes::NON_DIFFUSE);
+        At::some(seen.then_some(ThinDielectricAt { model: self, s, wi }), Model::ThinDielectric)
     }
 
     fn lobes(&self) -> Lobes {

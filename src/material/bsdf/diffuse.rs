@@ -1,7 +1,7 @@
 //! Lambertian reflection (Mitsuba's `diffuse`).
 
 use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
-use super::{BsdfSample, Lobes, Query, Scatter, Surface};
+use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface};
 use crate::base::math::Rgb;
 use crate::material::Texture;
 use glam::{Vec2, Vec3};
@@ -13,21 +13,26 @@ pub struct Diffuse {
     pub reflectance: Texture,
 }
 
-impl Scatter for Diffuse {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        if wi.z <= 0.0 || wo.z <= 0.0 || !query.lobes.contains(Lobes::DIFFUSE) {
-            return (Rgb::ZERO, 0.0);
-        }
+/// The model at a point, seen from above: its albedo.
+#[derive(Clone, Copy)]
+pub(super) struct DiffuseAt(Rgb);
+
+impl DiffuseAt {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
         let pdf = cosine_hemisphere_pdf(wo);
-        (self.reflectance.at(s) * pdf, pdf)
+        (self.0 * pdf, pdf)
     }
 
-    fn sample(&self, s: &Surface, wi: Vec3, _u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        if wi.z <= 0.0 || !query.lobes.contains(Lobes::DIFFUSE) {
-            return None;
-        }
+    pub(super) fn sample(&self, v: Vec2) -> Option<BsdfSample> {
         let wo = cosine_hemisphere(v);
-        BsdfSample::reflected(wo, self.reflectance.at(s), cosine_hemisphere_pdf(wo))
+        BsdfSample::reflected(wo, self.0, cosine_hemisphere_pdf(wo))
+    }
+}
+
+impl Scatter for Diffuse {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = wi.z > 0.0 && query.lobes.contains(Lobes::DIFFUSE);
+        At::some(seen.then(|| DiffuseAt(self.reflectance.at(s))), Model::Diffuse)
     }
 
     fn prefetch(&self, s: &Surface) {

@@ -4,6 +4,7 @@
 //! one-sided models are black from behind, `twosided` mirrors them.
 
 pub(crate) mod albedo;
+mod at;
 pub mod blend;
 pub mod bump;
 mod change;
@@ -19,6 +20,7 @@ pub mod roughplastic;
 pub mod twosided;
 pub mod warp;
 
+pub use at::At;
 pub use blend::Blend;
 pub use bump::{BumpMap, NormalMap};
 pub use conductor::{Conductor, RoughConductor};
@@ -34,6 +36,7 @@ pub use twosided::TwoSided;
 use super::{Surface, Texture};
 use crate::base::math::{Rgb, luminance};
 use crate::{Error, Result};
+use at::Model;
 use glam::{Vec2, Vec3};
 
 bitflags::bitflags! {
@@ -93,10 +96,7 @@ impl BsdfSample {
 
 /// What each model implements; [`Bsdf`]'s methods of the same names say what they mean.
 trait Scatter {
-    /// Value and density together: they share most of their terms.
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32);
-
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample>;
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a>;
 
     fn lobes(&self) -> Lobes;
 
@@ -202,6 +202,11 @@ macro_rules! each {
 }
 
 impl Bsdf {
+    /// The model at a point, for a viewer at `wi`: to be asked more than once.
+    pub fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        each!(self, model => model.at(s, wi, query))
+    }
+
     /// f(wi, wo) · |cos wo|, without delta lobes.
     pub fn eval(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> Rgb {
         self.eval_pdf(s, wi, wo, query).0
@@ -214,13 +219,13 @@ impl Bsdf {
 
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at the price of one.
     pub fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        each!(self, model => model.eval_pdf(s, wi, wo, query))
+        self.at(s, wi, query).eval_pdf(wo)
     }
 
     /// Draws a direction; `u` chooses the lobe, `v` the direction. `None` where the model is black or the facet drawn
     /// sends the light into the surface: a path that ends.
     pub fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        each!(self, model => model.sample(s, wi, u, v, query))
+        self.at(s, wi, query).sample(u, v)
     }
 
     /// The diffuse lobe factors as `f_d = diffuse_out(wi) · diffuse_in(wo) / π`. This is the view's factor,

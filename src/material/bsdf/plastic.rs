@@ -1,7 +1,7 @@
 //! A smooth dielectric coating over a diffuse base (Mitsuba's `plastic`).
 
 use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
-use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio};
+use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface, fresnel, positive_ratio};
 use crate::Result;
 use crate::base::math::Rgb;
 use crate::material::Texture;
@@ -73,36 +73,53 @@ impl Plastic {
     fn reflected(&self, w: Vec3) -> f32 {
         fresnel::dielectric(w.z, self.eta).r
     }
+}
 
-    /// Value and density of the diffuse lobe, for directions above the surface; `f_i` = reflected(wi).
-    fn diffuse(&self, colours: &Colours, f_i: f32, wo: Vec3, query: Query) -> (Rgb, f32) {
+/// The model at a point, seen from above.
+#[derive(Clone, Copy)]
+pub(super) struct PlasticAt<'a> {
+    model: &'a Plastic,
+    wi: Vec3,
+    query: Query,
+    /// Share of the light to `wi` that the coating reflects.
+    reflected: f32,
+    specular: Rgb,
+    /// Radiance of the base per irradiance through the coating.
+    base: Rgb,
+    /// Of drawing the specular lobe.
+    probability: f32,
+}
+
+impl PlasticAt<'_> {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
+        if wo.z <= 0.0 || !self.query.lobes.contains(Lobes::DIFFUSE) {
+            return (Rgb::ZERO, 0.0);
+        }
         let pdf = cosine_hemisphere_pdf(wo);
-        let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
-        let value = base * ((1.0 - f_i) * (1.0 - self.reflected(wo)) * pdf);
-        (value, pdf * (1.0 - colours.specular_probability(f_i, query)))
+        let value = self.base * ((1.0 - self.reflected) * (1.0 - self.model.reflected(wo)) * pdf);
+        (value, pdf * (1.0 - self.probability))
+    }
+
+    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+        if u < self.probability {
+            let weight = self.specular * (self.reflected / self.probability);
+            return Some(BsdfSample::mirrored(self.wi, weight, self.probability));
+        }
+        let wo = cosine_hemisphere(v);
+        let (value, pdf) = self.eval_pdf(wo);
+        BsdfSample::reflected(wo, value / pdf, pdf)
     }
 }
 
 impl Scatter for Plastic {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        if wi.z <= 0.0 || wo.z <= 0.0 || !query.lobes.contains(Lobes::DIFFUSE) {
-            return (Rgb::ZERO, 0.0);
-        }
-        self.diffuse(&self.params.at(s), self.reflected(wi), wo, query)
-    }
-
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let (f_i, colours) = (self.reflected(wi), self.params.at(s));
-        let p = colours.specular_probability(f_i, query);
-        if u < p {
-            return Some(BsdfSample::mirrored(wi, colours.specular * (f_i / p), p));
-        }
-        let wo = cosine_hemisphere(v);
-        let (value, pdf) = self.diffuse(&colours, f_i, wo, query);
-        BsdfSample::reflected(wo, value / pdf, pdf)
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = (wi.z > 0.0).then(|| {
+            let (reflected, colours) = (self.reflected(wi), self.params.at(s));
+            let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
+            let probability = colours.specular_probability(reflected, query);
+            PlasticAt { model: self, wi, query, reflected, specular: colours.specular, base, probability }
+        });
+        At::some(seen, Model::Plastic)
     }
 
     fn prefetch(&self, s: &Surface) {

@@ -7,7 +7,7 @@ use super::albedo::lobe_albedo;
 use super::microfacet::{ALPHA_MIN, Distribution, Microfacets};
 use super::roughdielectric::facet;
 use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf, direction};
-use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio, scalar};
+use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface, fresnel, positive_ratio, scalar};
 use crate::Result;
 use crate::base::math::{Rgb, luminance, reflect};
 use crate::material::Texture;
@@ -80,6 +80,7 @@ pub struct Principled {
 }
 
 /// The parameters at a point, and what follows from them.
+#[derive(Clone, Copy)]
 struct Point {
     base: Rgb,
     roughness: f32,
@@ -111,7 +112,7 @@ impl Principled {
         2.0 / (1.0 - (0.08 * specular.clamp(0.0, 1.0)).sqrt()) - 1.0
     }
 
-    fn at(&self, s: &Surface, query: Query) -> Point {
+    fn point(&self, s: &Surface, query: Query) -> Point {
         let p = &self.params;
         let base = p.base_color.at(s);
         let (roughness, metallic) = (scalar(&p.roughness, s), scalar(&p.metallic, s));
@@ -197,32 +198,44 @@ impl Principled {
     }
 }
 
-impl Scatter for Principled {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        let p = self.at(s, query);
+/// The model at a point, as one viewer sees it.
+#[derive(Clone, Copy)]
+pub(super) struct PrincipledAt<'a> {
+    model: &'a Principled,
+    s: &'a Surface,
+    wi: Vec3,
+    query: Query,
+    point: Point,
+    /// Of drawing the diffuse lobe and the clearcoat.
+    probabilities: (f32, f32),
+}
+
+impl PrincipledAt<'_> {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
+        let Self { model, wi, query, point: p, .. } = *self;
         let reflection = wi.z * wo.z > 0.0;
         // From behind there is only the glass.
         if wi.z * wo.z == 0.0 || (wi.z < 0.0 && p.glass <= 0.0) {
             return (Rgb::ZERO, 0.0);
         }
-        let (p_diffuse, p_coat) = self.probabilities(&p, wi, query);
+        let (p_diffuse, p_coat) = self.probabilities;
         let (mut value, mut density) = (Rgb::ZERO, 0.0);
         if query.lobes.contains(Lobes::DIFFUSE) && reflection && wi.z > 0.0 {
-            value += self.diffuse(s, &p, wi, wo, (wi + wo).normalize_or_zero());
+            value += model.diffuse(self.s, &p, wi, wo, (wi + wo).normalize_or_zero());
             density += p_diffuse * cosine_hemisphere_pdf(wo);
         }
         if !query.lobes.contains(Lobes::NON_DIFFUSE) {
             return (value, density);
         }
-        let Some((m, jacobian)) = facet(wi, wo, self.params.eta) else { return (value, density) };
-        let f = fresnel::dielectric(wi.dot(m), self.params.eta);
+        let Some((m, jacobian)) = facet(wi, wo, model.params.eta) else { return (value, density) };
+        let f = fresnel::dielectric(wi.dot(m), model.params.eta);
         let (d, g_i, g_o) = (p.facets.d(m), p.facets.g1_over_cos(wi, m), p.facets.g1(wo, m));
         let visible = (1.0 - p_diffuse - p_coat) * d * g_i * wi.dot(m).abs() * jacobian;
-        let p_reflect = Self::reflection_probability(&p, wi, f.r);
+        let p_reflect = Principled::reflection_probability(&p, wi, f.r);
         if reflection {
             density += visible * p_reflect;
             if f.r > 0.0 {
-                let colour = if wi.z > 0.0 { self.fresnel(&p, f.r, wi.dot(m)) } else { Rgb::splat(p.glass * f.r) };
+                let colour = if wi.z > 0.0 { model.fresnel(&p, f.r, wi.dot(m)) } else { Rgb::splat(p.glass * f.r) };
                 value += colour * (0.25 * d * g_i * g_o);
             }
             if wi.z > 0.0 && p.clearcoat > 0.0 {
@@ -230,7 +243,7 @@ impl Scatter for Principled {
                 density += p_coat * d * m.z * jacobian;
                 let shadowing = Microfacets::new(Distribution::Ggx, Vec2::splat(CLEARCOAT_SHADOWING_ALPHA));
                 let g = shadowing.g1(wi, m) * shadowing.g1(wo, m);
-                let f = self.schlick_from(Rgb::splat(CLEARCOAT_F0), wi.dot(m));
+                let f = model.schlick_from(Rgb::splat(CLEARCOAT_F0), wi.dot(m));
                 value += f * (p.clearcoat * CLEARCOAT_STRENGTH * d * g * wo.z);
             }
         } else {
@@ -241,12 +254,12 @@ impl Scatter for Principled {
         (value, density)
     }
 
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        let p = self.at(s, query);
+    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+        let Self { model, wi, query, point: p, .. } = *self;
         if wi.z == 0.0 || (wi.z < 0.0 && (p.glass <= 0.0 || !query.lobes.contains(Lobes::NON_DIFFUSE))) {
             return None;
         }
-        let (p_diffuse, p_coat) = self.probabilities(&p, wi, query);
+        let (p_diffuse, p_coat) = self.probabilities;
         let mut eta = 1.0;
         let wo = if u < p_diffuse {
             cosine_hemisphere(v)
@@ -254,9 +267,9 @@ impl Scatter for Principled {
             reflect(wi, sample_gtr1(p.coat_alpha, v))
         } else {
             let m = p.facets.sample(if wi.z > 0.0 { wi } else { -wi }, v);
-            let f = fresnel::dielectric(wi.dot(m), self.params.eta);
+            let f = fresnel::dielectric(wi.dot(m), model.params.eta);
             let u = (u - p_diffuse - p_coat) / (1.0 - p_diffuse - p_coat);
-            let reflection = u < Self::reflection_probability(&p, wi, f.r);
+            let reflection = u < Principled::reflection_probability(&p, wi, f.r);
             let wo = if reflection { reflect(wi, m) } else { fresnel::refract(wi, m, &f) };
             if reflection != (wi.z * wo.z > 0.0) {
                 return None;
@@ -265,9 +278,17 @@ impl Scatter for Principled {
             wo
         };
         let wo = wo.normalize_or_zero();
-        let (value, pdf) = self.eval_pdf(s, wi, wo, query);
+        let (value, pdf) = self.eval_pdf(wo);
         let sample = BsdfSample::reflected(wo, value / pdf, pdf)?;
         Some(BsdfSample { eta, ..sample })
+    }
+}
+
+impl Scatter for Principled {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let point = self.point(s, query);
+        let probabilities = self.probabilities(&point, wi, query);
+        At::some(Some(PrincipledAt { model: self, s, wi, query, point, probabilities }), Model::Principled)
     }
 
     fn lobes(&self) -> Lobes {
@@ -290,7 +311,7 @@ impl Scatter for Principled {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        let p = self.at(s, Query::default());
+        let p = self.point(s, Query::default());
         let mut sum = Rgb::ZERO;
         for (cos2, weight) in NODES {
             for k in 0..AZIMUTHS {
@@ -302,7 +323,7 @@ impl Scatter for Principled {
     }
 
     fn glossy_albedo(&self, s: &Surface, wi: Vec3, query: Query) -> Rgb {
-        let p = self.at(s, query);
+        let p = self.point(s, query);
         if wi.z <= 0.0 {
             return if self.is_transmissive() { p.base * p.glass } else { Rgb::ZERO };
         }
@@ -314,7 +335,7 @@ impl Scatter for Principled {
     }
 
     fn alpha(&self, s: &Surface) -> Option<f32> {
-        Some(self.at(s, Query::default()).facets.mean_alpha())
+        Some(self.point(s, Query::default()).facets.mean_alpha())
     }
 
     fn is_transmissive(&self) -> bool {

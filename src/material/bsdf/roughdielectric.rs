@@ -2,7 +2,7 @@
 
 use super::dielectric::DielectricParams;
 use super::microfacet::{Distribution, Microfacets};
-use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio, scalar};
+use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface, fresnel, positive_ratio, scalar};
 use crate::Result;
 use crate::base::math::{Rgb, reflect};
 use crate::material::Texture;
@@ -51,38 +51,53 @@ impl RoughDielectric {
     }
 }
 
-impl Scatter for RoughDielectric {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        if wi.z == 0.0 || wo.z == 0.0 || !query.lobes.contains(Lobes::NON_DIFFUSE) {
+/// The model at a point, seen from either side.
+#[derive(Clone, Copy)]
+pub(super) struct RoughDielectricAt<'a> {
+    model: &'a RoughDielectric,
+    s: &'a Surface,
+    wi: Vec3,
+    facets: Microfacets,
+}
+
+impl RoughDielectricAt<'_> {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
+        let (wi, facets, params) = (self.wi, &self.facets, &self.model.params);
+        if wo.z == 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let Some((m, jacobian)) = facet(wi, wo, self.eta) else { return (Rgb::ZERO, 0.0) };
-        let facets = self.facets(s, query);
-        let f = fresnel::dielectric(wi.dot(m), self.eta);
+        let Some((m, jacobian)) = facet(wi, wo, self.model.eta) else { return (Rgb::ZERO, 0.0) };
+        let f = fresnel::dielectric(wi.dot(m), self.model.eta);
         // D G1(wi) (wi·m)/cos wi · dm/dwo: density of the facet; G1(wo) is left for the value.
         let visible = facets.d(m) * facets.g1_over_cos(wi, m) * wi.dot(m).abs() * jacobian;
         let (share, colour) = if wi.z * wo.z > 0.0 {
-            (f.r, self.params.specular_reflectance.at(s))
+            (f.r, params.specular_reflectance.at(self.s))
         } else {
-            (1.0 - f.r, self.params.specular_transmittance.at(s) * (f.eta_ti * f.eta_ti))
+            (1.0 - f.r, params.specular_transmittance.at(self.s) * (f.eta_ti * f.eta_ti))
         };
         (colour * (share * visible * facets.g1(wo, m)), share * visible)
     }
 
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        if wi.z == 0.0 || !query.lobes.contains(Lobes::NON_DIFFUSE) {
-            return None;
-        }
-        let m = self.facets(s, query).sample(if wi.z > 0.0 { wi } else { -wi }, v);
-        let f = fresnel::dielectric(wi.dot(m), self.eta);
+    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+        let wi = self.wi;
+        let m = self.facets.sample(if wi.z > 0.0 { wi } else { -wi }, v);
+        let f = fresnel::dielectric(wi.dot(m), self.model.eta);
         let reflection = u < f.r;
         let wo = if reflection { reflect(wi, m) } else { fresnel::refract(wi, m, &f) }.normalize_or_zero();
         if reflection != (wi.z * wo.z > 0.0) {
             return None;
         }
-        let (value, pdf) = self.eval_pdf(s, wi, wo, query);
+        let (value, pdf) = self.eval_pdf(wo);
         let sample = BsdfSample::reflected(wo, value / pdf, pdf)?;
         Some(BsdfSample { eta: if reflection { 1.0 } else { f.eta_it }, ..sample })
+    }
+}
+
+impl Scatter for RoughDielectric {
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = wi.z != 0.0 && query.lobes.contains(Lobes::NON_DIFFUSE);
+        let at = || RoughDielectricAt { model: self, s, wi, facets: self.facets(s, query) };
+        At::some(seen.then(at), Model::RoughDielectric)
     }
 
     fn lobes(&self) -> Lobes {

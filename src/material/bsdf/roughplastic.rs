@@ -6,9 +6,9 @@
 
 use super::albedo::{gauss_legendre, lobe_albedo, reflected_mean, transmitted_mean};
 use super::microfacet::{ALPHA_MIN, Distribution, Microfacets};
-use super::plastic::{Colours, PlasticParams};
+use super::plastic::PlasticParams;
 use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
-use super::{BsdfSample, Lobes, Query, Scatter, Surface, fresnel, positive_ratio};
+use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface, fresnel, positive_ratio};
 use crate::base::math::{Rgb, reflect};
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
@@ -66,51 +66,69 @@ impl RoughPlastic {
     fn facets(&self, query: Query) -> Microfacets {
         Microfacets::new(self.distribution, Vec2::splat(self.alpha * query.roughness_scale))
     }
+}
 
-    /// Value and density for a view above the surface; `t_i` = transmitted(wi).
-    fn eval_pdf_with(&self, colours: &Colours, t_i: f32, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
+/// The model at a point, seen from above.
+#[derive(Clone, Copy)]
+pub(super) struct RoughPlasticAt<'a> {
+    model: &'a RoughPlastic,
+    wi: Vec3,
+    query: Query,
+    facets: Microfacets,
+    /// Share of the light from the base that gets out to `wi`.
+    transmitted: f32,
+    specular: Rgb,
+    /// Radiance of the base per irradiance through the coating.
+    base: Rgb,
+    /// Of drawing the specular lobe.
+    probability: f32,
+}
+
+impl RoughPlasticAt<'_> {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
         if wo.z <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let p = colours.specular_probability(1.0 - t_i, query);
+        let (wi, facets, p) = (self.wi, &self.facets, self.probability);
         let (mut value, mut density) = (Rgb::ZERO, 0.0);
-        if query.lobes.contains(Lobes::NON_DIFFUSE) {
-            let facets = self.facets(query);
+        if self.query.lobes.contains(Lobes::NON_DIFFUSE) {
             let m = (wi + wo).normalize_or_zero();
             let visible = 0.25 * facets.d(m) * facets.g1_over_cos(wi, m);
             if visible > 0.0 {
-                let f = fresnel::dielectric(wi.dot(m), self.eta).r;
-                value += colours.specular * (f * visible * facets.g1(wo, m));
+                let f = fresnel::dielectric(wi.dot(m), self.model.eta).r;
+                value += self.specular * (f * visible * facets.g1(wo, m));
                 density += p * visible;
             }
         }
-        if query.lobes.contains(Lobes::DIFFUSE) {
+        if self.query.lobes.contains(Lobes::DIFFUSE) {
             let cosine = cosine_hemisphere_pdf(wo);
-            let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
-            value += base * (t_i * self.transmitted(wo) * cosine);
+            value += self.base * (self.transmitted * self.model.transmitted(wo) * cosine);
             density += (1.0 - p) * cosine;
         }
         (value, density)
     }
+
+    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
+        let wo = if u < self.probability {
+            reflect(self.wi, self.facets.sample(self.wi, v)).normalize_or_zero()
+        } else {
+            cosine_hemisphere(v)
+        };
+        let (value, pdf) = self.eval_pdf(wo);
+        BsdfSample::reflected(wo, value / pdf, pdf)
+    }
 }
 
 impl Scatter for RoughPlastic {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return (Rgb::ZERO, 0.0);
-        }
-        self.eval_pdf_with(&self.params.at(s), self.transmitted(wi), wi, wo, query)
-    }
-
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let (t_i, colours) = (self.transmitted(wi), self.params.at(s));
-        let p = colours.specular_probability(1.0 - t_i, query);
-        let wo = if u < p { reflect(wi, self.facets(query).sample(wi, v)).normalize_or_zero() } else { cosine_hemisphere(v) };
-        let (value, pdf) = self.eval_pdf_with(&colours, t_i, wi, wo, query);
-        BsdfSample::reflected(wo, value / pdf, pdf)
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let seen = (wi.z > 0.0).then(|| {
+            let (transmitted, colours) = (self.transmitted(wi), self.params.at(s));
+            let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
+            let probability = colours.specular_probability(1.0 - transmitted, query);
+            let facets = self.facets(query);
+            RoughPlasticAt { model: self, wi, query, facets, transmitted, specular: colours.specular, base, probability }
+        });
+        At::some(seen, Model::RoughPlastic)
     }
 
     fn prefetch(&self, s: &Surface) {

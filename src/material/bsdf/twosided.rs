@@ -1,9 +1,9 @@
 //! A model for each side of a surface (Mitsuba's `twosided`).
 
-use super::{Bsdf, BsdfSample, Lobes, Query, Scatter, Surface};
+use super::{At, Bsdf, Lobes, Query, Scatter, Surface};
 use crate::base::math::Rgb;
 use crate::{Error, Result};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// Different models in front and behind.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -35,13 +35,9 @@ fn towards(w: Vec3, v: Vec3) -> Vec3 {
 }
 
 impl Scatter for TwoSided {
-    fn eval_pdf(&self, s: &Surface, wi: Vec3, wo: Vec3, query: Query) -> (Rgb, f32) {
-        self.side(wi).eval_pdf(s, towards(wi, wi), towards(wi, wo), query)
-    }
-
-    fn sample(&self, s: &Surface, wi: Vec3, u: f32, v: Vec2, query: Query) -> Option<BsdfSample> {
-        let sample = self.side(wi).sample(s, towards(wi, wi), u, v, query)?;
-        Some(BsdfSample { wo: towards(wi, sample.wo), ..sample })
+    fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
+        let front = wi.z > 0.0;
+        self.side(wi).at(s, towards(wi, wi), query).on_side(!front)
     }
 
     fn prefetch(&self, s: &Surface) {

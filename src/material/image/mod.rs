@@ -91,6 +91,17 @@ impl Image {
         self.at(y * self.width + x)
     }
 
+    /// The pixels of two columns in two rows: those of the first row, then those of the second.
+    #[inline]
+    pub(crate) fn four(&self, [left, right]: [usize; 2], rows: [usize; 2]) -> [[Rgb; 2]; 2] {
+        let [upper, lower] = rows.map(|y| y * self.width);
+        let places = [[upper + left, upper + right], [lower + left, lower + right]];
+        match &self.pixels {
+            Pixels::Float(pixels) => places.map(|row| row.map(|i| pixels[i])),
+            Pixels::Bytes { rgb, linear } => places.map(|row| row.map(|i| of_bytes(rgb, linear, i))),
+        }
+    }
+
     /// Tells the caches that [`Image::pixel`] will be read.
     #[inline]
     pub fn prefetch(&self, x: usize, y: usize) {
@@ -105,10 +116,13 @@ impl Image {
     fn at(&self, i: usize) -> Rgb {
         match &self.pixels {
             Pixels::Float(pixels) => pixels[i],
-            Pixels::Bytes { rgb, linear } => {
-                let [r, g, b] = [rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]].map(|byte| linear[byte as usize]);
-                Rgb::new(r, g, b)
-            }
+            Pixels::Bytes { rgb, linear } => of_bytes(rgb, linear, i),
         }
     }
+}
+
+#[inline(always)]
+fn of_bytes(rgb: &[u8], linear: &[f32; 256], i: usize) -> Rgb {
+    let [r, g, b] = [0, 1, 2].map(|k| rgb[3 * i..3 * i + 3][k]);
+    Rgb::new(linear[r as usize], linear[g as usize], linear[b as usize])
 }

@@ -155,7 +155,7 @@ fn efficiency<const N: usize>(pixels: &[Pixel<N>], weights: &[[Rgb; N]], count: 
 /// The full image's sample.
 pub(super) fn full(walk: &mut Walk, ray: &Ray, [weight]: &[Rgb; 1], sampler: &mut Sampler) -> ([Rgb; 1], f32) {
     let world = walk.world;
-    let numbers = walk.emitter_numbers(sampler);
+    let numbers = walk.numbers(sampler);
     let Some(surface) = world.seen(ray) else { return ([world.backdrop(ray.d)], RAY_COST) };
     let start = Start { weight: *weight, eta: 1.0, depth: 0 };
     let scattered = walk.scattered(numbers, &surface, -ray.d, Query::default(), start, sampler);
@@ -167,7 +167,7 @@ pub(super) fn full(walk: &mut Walk, ray: &Ray, [weight]: &[Rgb; 1], sampler: &mu
 pub(super) fn layers(walk: &mut Walk, ray: &Ray, weights: &[Rgb; 3], sampler: &mut Sampler) -> ([Rgb; 3], f32) {
     let world = walk.world;
     let mut branches = [0, 1].map(|k| sampler.branch(k));
-    let numbers = branches.each_mut().map(|branch| walk.emitter_numbers(branch));
+    let numbers = branches.each_mut().map(|branch| walk.numbers(branch));
     let Some(surface) = world.seen(ray) else { return ([world.backdrop(ray.d), Rgb::ZERO, Rgb::ZERO], RAY_COST) };
     let present = world.scene.materials[surface.material as usize].bsdf.lobes();
     let mut layers = [world.lights.emitted(&world.scene, &surface, -ray.d), Rgb::ZERO, Rgb::ZERO];

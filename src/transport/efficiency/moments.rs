@@ -32,12 +32,21 @@ struct Cell {
 
 impl Cell {
     /// From the finest to what is known of the material all around.
-    fn keys(self) -> [u64; 3] {
+    fn keys(self) -> impl Iterator<Item = u64> {
         let Self { at, side, direction, material } = self;
-        let key = |level: u64, at: [u64; 3], side, direction| {
+        let key = move |level: u64| {
+            let (at, side, direction) = match level {
+                1 => (at, side, direction),
+                2 => (at, side, 0),
+                _ => (at.map(|x| x >> 2), 0, 0),
+            };
             at.iter().fold(level, |k, x| k << 8 | x) << 32 | side << 29 | direction << 24 | (material & 0xff_ffff)
         };
-        [key(1, at, side, direction), key(2, at, side, 0), key(3, at.map(|x| x >> 2), 0, 0)]
+        (1..=3).map(key)
+    }
+
+    fn finest(self) -> u64 {
+        self.keys().next().unwrap_or_default()
     }
 }
 
@@ -135,7 +144,7 @@ impl Tally {
     /// Takes in an estimate, of a kind, of the light that `s` scatters, to `wo` where its material has other than diffuse lobes.
     pub fn record(&mut self, s: &Surface, wo: Option<Vec3>, kind: Kind, estimate: &Estimate) {
         let cell = self.grid.cell(s, wo);
-        self.cells.entry(cell.keys()[0]).or_insert((cell, [Sums::default(); 2])).1[kind as usize].add(&Sums::of(estimate));
+        self.cells.entry(cell.finest()).or_insert((cell, [Sums::default(); 2])).1[kind as usize].add(&Sums::of(estimate));
     }
 
     /// Takes in all of another one.
@@ -149,7 +158,7 @@ impl Tally {
     /// What is to be believed of it.
     pub fn moments(&self) -> Moments {
         let mut fine: Vec<_> = self.cells.values().collect();
-        fine.sort_by_key(|(cell, _)| cell.keys());
+        fine.sort_by_key(|(cell, _)| cell.finest());
         let mut all: HashMap<u64, [Sums; 2], BuildHasherDefault<Mixed>> = HashMap::default();
         for (cell, sums) in fine {
             for key in cell.keys() {
@@ -213,7 +222,7 @@ impl Moments {
             let (has, moments) = &self.slots[self.slot(key)];
             (*has == key).then_some(*moments)
         };
-        self.grid.cell(s, wo).keys().into_iter().find_map(found)
+        self.grid.cell(s, wo).keys().find_map(found)
     }
 
     /// Where a key lies, or would.

@@ -7,7 +7,7 @@ use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::transport::light_tree::Receiver;
 use crate::transport::met::{Found, emission_met, environment_met};
-use crate::transport::path::{Measure, PathParams, Vertex, keep_finite, survival};
+use crate::transport::path::{PathParams, Vertex, keep_finite, receiver, survival};
 use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
 
@@ -69,50 +69,53 @@ struct Reached<'a> {
 }
 
 impl Walk<'_> {
-    /// The numbers by which a vertex will choose an emitter; best drawn before the ray to it is cast, so that tables are fetched while it is
-    /// under way.
+    /// The numbers by which a vertex will choose an emitter, and a direction; best drawn before the ray to it is cast, so that tables are
+    /// fetched while it is under way.
     #[inline]
-    pub fn emitter_numbers(&self, sampler: &mut Sampler) -> [f32; 4] {
-        let numbers @ [x, y, choice, _] = sampler.next_4d();
+    pub fn numbers(&self, sampler: &mut Sampler) -> [[f32; 4]; 2] {
+        let numbers = sampler.next_two_4d();
+        let [x, y, choice, _] = numbers[0];
         self.world.lights.prefetch(choice, Vec2::new(x, y));
         numbers
     }
 
-    /// One estimate of the radiance that `s` scatters to `wo` by the lobes of `query`; `numbers` are [`Walk::emitter_numbers`].
+    /// One estimate of the radiance that `s` scatters to `wo` by the lobes of `query`, by the [`Walk::numbers`] of this vertex.
     pub fn scattered(
         &mut self,
-        mut numbers: [f32; 4],
+        [emitter, direction]: [[f32; 4]; 2],
         s: &Surface,
         wo: Vec3,
         query: Query,
         start: Start,
         sampler: &mut Sampler,
     ) -> Estimate {
-        self.world.lights.prefetch_radiance(numbers[2], Vec2::new(numbers[0], numbers[1]));
+        self.world.lights.prefetch_radiance(emitter[2], Vec2::new(emitter[0], emitter[1]));
         self.world.prefetch(s);
-        let vertex = Vertex { world: self.world, surface: s, measure: Measure::Scattering { wi: s.frame.to_local(wo), query } };
         let lobes = self.world.scene.materials[s.material as usize].bsdf.lobes();
-        let direction = lobes.intersects(Lobes::NON_DIFFUSE).then_some(wo);
-        let reached = Reached { s, query, start, direction };
+        let reached = Reached { s, query, start, direction: lobes.intersects(Lobes::NON_DIFFUSE).then_some(wo) };
         let [direct, onward] = self.counts(&reached);
-        let from = vertex.receiver();
+        let [emitters, rays] = [(direct + emitter[3]) as u32, (onward + direction[3]) as u32];
         let mut sum = Estimate::default();
+        if emitters + rays == 0 {
+            return sum;
+        }
+        let from = receiver(self.world, s, wo);
+        let light = |[x, y, choice, _]: [f32; 4]| self.world.light(&from, choice, Vec2::new(x, y));
+        // Before the textures are read, which have been asked for only now.
+        let first = if emitters > 0 { light(emitter) } else { None };
+        let vertex = Vertex::scattering(self.world, s, wo, query);
         let share = Rgb::splat(1.0 / direct);
-        for k in 0..(direct + numbers[3]) as u32 {
-            if k > 0 {
-                numbers = sampler.branch(k << 16 | start.depth).next_4d();
-            }
-            let [x, y, choice, _] = numbers;
-            let light = keep_finite(vertex.direct(&from, choice, Vec2::new(x, y)));
+        for k in 0..emitters {
+            let light = if k == 0 { first } else { light(sampler.branch(k << 16 | start.depth).next_4d()) };
+            let light = keep_finite(vertex.direct(light));
             let estimate = Estimate { light, cost: DIRECT_COST };
             self.record(&reached, Kind::Direct, &estimate);
             sum.add(estimate, share);
         }
-        let numbers = sampler.next_4d();
         let share = 1.0 / onward;
-        for k in 0..(onward + numbers[3]) as u32 {
+        for k in 0..rays {
             let estimate = if k == 0 {
-                self.onward(&vertex, &from, &reached, numbers, share, sampler)
+                self.onward(&vertex, &from, &reached, direction, share, sampler)
             } else {
                 let mut branch = sampler.branch(k << 16 | 1 << 15 | start.depth);
                 let numbers = branch.next_4d();
@@ -168,7 +171,7 @@ impl Walk<'_> {
     /// Radiance along a ray: emission, weighted against the emitter sampling at its origin, and what is scattered there.
     fn incident(&mut self, ray: &Ray, from: &Receiver, found: Found, at: Start, sampler: &mut Sampler) -> Estimate {
         let world = self.world;
-        let numbers = self.emitter_numbers(sampler);
+        let numbers = self.numbers(sampler);
         let Some(s) = world.intersect(ray) else {
             let (light, weight) = environment_met(world, ray.d, from, found);
             return Estimate { light: light * weight, cost: 0.0 };
