@@ -195,7 +195,12 @@ fn rays_beside_probes_are_nearer_and_threads_do_not_change_a_bit() {
     let [probes, joined] = ["out/frames", "again"].map(error);
     assert!(joined < 0.9 * probes, "probes {probes}, joined {joined}");
 
-    figures(&f, &render("--set rays.per_pixel=4 --denoise=filter"));
+    // Our own filter looks less far where rays are many, unless it is told to.
+    for (set, levels) in [("16", 1), ("4", 2), ("4 --set denoise.filter.levels=3", 3)] {
+        figures(&f, &render(&format!("--denoise=filter --set rays.per_pixel={set}")));
+        let shown: Value = serde_json::from_str(&f.success("info again/0001.exr --json")).unwrap();
+        assert_eq!(shown["provenance"]["parameters"]["parameters"]["denoise"]["filter"]["levels"], levels, "{set}");
+    }
     let message = f.refusal(&render("--denoise=filter"));
     assert!(message.contains("--set rays.per_pixel=24"), "{message}");
     let message = f.refusal(&render("--set rays.per_pixel=1"));

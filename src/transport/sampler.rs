@@ -140,11 +140,16 @@ fn point([a, b, c, d]: &Nibbles, shuffled: u32) -> u128 {
 /// [`owen_scramble_rev`], eight at a time.
 #[inline(always)]
 fn owen_scrambled<S: Simd>(s: S, n: S::I, scramble: S::I) -> S::I {
-    let times = |n: S::I, factor: u32| s.xor_ids(n, s.mul_ids(n, s.splat_ids(factor)));
     // The upper half, made odd.
     let factor = s.add_ids(s.and_ids(s.shift_down::<16>(scramble), s.splat_ids(0xfffe)), s.splat_ids(1));
-    let n = s.mul_ids(s.add_ids(times(n, 0x3d20_adea), scramble), factor);
-    times(times(n, 0x0552_6c56), 0x53a2_2864)
+    let n = s.mul_ids(s.add_ids(with_multiple(s, n, 0x3d20_adea), scramble), factor);
+    with_multiple(s, with_multiple(s, n, 0x0552_6c56), 0x53a2_2864)
+}
+
+/// Each number and a multiple of it, a bit at a time. (No closure: those are not compiled for the machine's lanes.)
+#[inline(always)]
+fn with_multiple<S: Simd>(s: S, n: S::I, factor: u32) -> S::I {
+    s.xor_ids(n, s.mul_ids(n, s.splat_ids(factor)))
 }
 
 /// [`hash`], eight at a time.
@@ -159,12 +164,18 @@ fn hashed<S: Simd>(s: S, n: S::I) -> S::I {
 /// The bits of each number in reverse: neighbours swap places, then pairs, fours, bytes and halves.
 #[inline(always)]
 fn reversed<S: Simd>(s: S, n: S::I) -> S::I {
-    let of = |n: S::I, mask: u32| s.and_ids(n, s.splat_ids(mask));
-    let n = s.add_ids(of(s.shift_down::<1>(n), 0x5555_5555), s.shift_up::<1>(of(n, 0x5555_5555)));
-    let n = s.add_ids(of(s.shift_down::<2>(n), 0x3333_3333), s.shift_up::<2>(of(n, 0x3333_3333)));
-    let n = s.add_ids(of(s.shift_down::<4>(n), 0x0f0f_0f0f), s.shift_up::<4>(of(n, 0x0f0f_0f0f)));
-    let n = s.add_ids(of(s.shift_down::<8>(n), 0x00ff_00ff), s.shift_up::<8>(of(n, 0x00ff_00ff)));
+    let n = swapped::<1, S>(s, n, 0x5555_5555);
+    let n = swapped::<2, S>(s, n, 0x3333_3333);
+    let n = swapped::<4, S>(s, n, 0x0f0f_0f0f);
+    let n = swapped::<8, S>(s, n, 0x00ff_00ff);
     s.add_ids(s.shift_down::<16>(n), s.shift_up::<16>(n))
+}
+
+/// Groups of so many bits, those of `lower` and their neighbours, in each other's place.
+#[inline(always)]
+fn swapped<const BITS: i32, S: Simd>(s: S, n: S::I, lower: u32) -> S::I {
+    let lower = s.splat_ids(lower);
+    s.add_ids(s.and_ids(s.shift_down::<BITS>(n), lower), s.shift_up::<BITS>(s.and_ids(n, lower)))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::GlossyProbeParams;
 use super::gpu::Renderer as OnGpu;
 use super::inspect::with_passes;
-use super::rays::{RaysParams, Shot, joined};
+use super::rays::{RaysParams, Shot, filter, joined};
 use super::renderer::{Renderer as OnCpu, Reprojected};
 use super::wanted::Served;
 use crate::base::clock::Clock;
@@ -63,7 +63,12 @@ pub fn resolve(options: &Options) -> Result<GlossyProbeParams> {
     if matches!(denoise, Some(Denoiser::Oidn { .. })) {
         base.rays.window /= 2.0;
     }
-    let params = apply(&GlossyProbeParams { supersample, denoise, ..base }, &options.set)?;
+    let own_filter = matches!(denoise, Some(Denoiser::Filter(_)));
+    let with = |denoise| apply(&GlossyProbeParams { supersample, denoise, ..base.clone() }, &options.set);
+    let mut params = with(denoise)?;
+    if own_filter {
+        params = with(Some(Denoiser::Filter(filter(params.rays.per_pixel))))?;
+    }
     if params.denoise.is_some() && params.rays.per_pixel == 0 {
         return Err(Error::Request("--denoise: glossy-probes have no noise without rays: --set rays.per_pixel=24".into()));
     }

@@ -20,6 +20,7 @@ use crate::base::named::within;
 use crate::lightmap::LightMap;
 use crate::scene::Camera;
 use crate::transport::World;
+use crate::view::denoise::DenoiseParams;
 use crate::view::denoiser::Denoiser;
 use crate::{Error, Result};
 use budget::allotted;
@@ -27,6 +28,9 @@ use glam::Vec2;
 use halves::{Lit, Sums, follow};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+
+/// Rays a pixel from which on our own filter looks no farther than its first level: what noise is left is less than what the next one blurs.
+const MANY: u32 = 16;
 
 /// Most rays a pixel.
 const MOST_RAYS: u32 = 1 << 12;
@@ -69,6 +73,13 @@ impl RaysParams {
         within("rays.bounces", self.bounces, 1..=MOST_RAYS)?;
         within("rays.window", self.window, 0.5..=256.0)
     }
+}
+
+/// Our own filter for the halves of so many rays a pixel. The probes have what is smooth, so that this may stop at far less than where it has but the
+/// noise of a path or two before it.
+pub fn filter(per_pixel: u32) -> DenoiseParams {
+    let levels = if per_pixel < MANY { 2 } else { 1 };
+    DenoiseParams { levels, normal_power: 512.0, depth_sigma: 0.5, albedo_sigma: 0.05, ..DenoiseParams::default() }
 }
 
 /// A camera and its frame's random numbers.
