@@ -23,7 +23,7 @@ const BUMP_MAP: u32 = 10u;
 const NORMAL_MAP: u32 = 11u;
 const BLEND: u32 = 12u;
 
-// Twin: transport::bsdf::roughplastic::COSINES.
+// Twin: material::bsdf::roughplastic::COSINES.
 const PLASTIC_COSINES: u32 = 64u;
 
 const DIFFUSE: u32 = 1u;
