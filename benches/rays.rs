@@ -45,7 +45,7 @@ fn rays(world: &World) -> [Vec<Ray>; 2] {
             let n = s.ng * -ray.d.dot(s.ng).signum();
             let k = 8 + 8 * bounce;
             if let Some(l) = world.lights.sample(&world.scene, &Receiver { p: s.p, n }, u(k), Vec2::new(u(k + 1), u(k + 2))) {
-                shadow.push(if l.distance.is_finite() { s.spawn_to(l.point) } else { s.spawn(l.wi) });
+                shadow.push(l.shadow_ray(&s));
             }
             let (r, phi) = (u(k + 3).sqrt(), u(k + 4) * std::f32::consts::TAU);
             let local = Vec3::new(r * phi.cos(), r * phi.sin(), (1.0 - r * r).max(0.0).sqrt());

@@ -1,6 +1,8 @@
 //! What emitter sampling yields.
 
 use crate::base::math::Rgb;
+use crate::base::ray::Ray;
+use crate::material::Surface;
 use glam::Vec3;
 
 /// A direction towards an emitter.
@@ -18,4 +20,12 @@ pub struct LightSample {
     pub pdf: f32,
     /// Whether no BSDF sample can find it (point, spot, directional).
     pub delta: bool,
+}
+
+impl LightSample {
+    /// The ray from a surface that tells whether something stands before the emitter.
+    #[inline]
+    pub fn shadow_ray(&self, surface: &Surface) -> Ray {
+        if self.distance.is_finite() { surface.spawn_to(self.point) } else { surface.spawn(self.wi) }
+    }
 }

@@ -328,14 +328,10 @@ impl<'a> Vertex<'a> {
         let Some(light) = light else { return Rgb::ZERO };
         let wo = self.surface.frame.to_local(light.wi);
         let (value, pdf) = self.eval_pdf(wo);
-        if value == Rgb::ZERO || light.weight == Rgb::ZERO || self.world.occluded(&self.shadow_ray(&light)) {
+        if value == Rgb::ZERO || light.weight == Rgb::ZERO || self.world.occluded(&light.shadow_ray(self.surface)) {
             return Rgb::ZERO;
         }
         light.weight * value * power_heuristic(light.pdf, if light.delta { 0.0 } else { pdf })
-    }
-
-    fn shadow_ray(&self, light: &LightSample) -> Ray {
-        if light.distance.is_finite() { self.surface.spawn_to(light.point) } else { self.surface.spawn(light.wi) }
     }
 
     /// What radiance from the local direction `wo` is multiplied with, cosine included, and the density (solid angle) with

@@ -38,8 +38,8 @@ impl Sampler {
 
     /// The next set of four dimensions, each in [0, 1); what is left of the set before is passed over.
     pub fn next_4d(&mut self) -> [f32; 4] {
+        let set = self.set;
         self.skip_4d();
-        let set = self.set - 1;
         if set < SOBOL_SETS {
             self.sobol([set; 2])[0]
         } else {

@@ -40,9 +40,13 @@ pub(super) enum Model<'a> {
 }
 
 impl<'a> At<'a> {
+    pub(super) fn of(model: Model<'a>) -> Self {
+        Self { model, behind: false }
+    }
+
     /// Of a model that is there, or is black.
     pub(super) fn some<T>(model: Option<T>, wrap: impl FnOnce(T) -> Model<'a>) -> Self {
-        Self { model: model.map_or(Model::Black, wrap), behind: false }
+        Self::of(model.map_or(Model::Black, wrap))
     }
 
     /// The same, seen from the back of a two-sided model, or from its front.

@@ -91,7 +91,7 @@ impl Scatter for Blend {
     fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
         let share = self.share_of_b(s);
         let probability = self.probability_of_b(share, query);
-        At::some(Some(BlendAt { model: self, s, wi, query, share, probability }), Model::Blend)
+        At::of(Model::Blend(BlendAt { model: self, s, wi, query, share, probability }))
     }
 
     fn lobes(&self) -> Lobes {

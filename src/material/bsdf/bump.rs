@@ -138,7 +138,7 @@ impl TiltedAt<'_> {
 impl<T: Tilted> Scatter for T {
     fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
         let tilt = Tilt::new(self, s, wi);
-        At::some(Some(TiltedAt { tilt, nested: self.nested(), s, view: tilt.view(wi), query }), Model::Tilted)
+        At::of(Model::Tilted(TiltedAt { tilt, nested: self.nested(), s, view: tilt.view(wi), query }))
     }
 
     fn lobes(&self) -> Lobes {

@@ -18,6 +18,13 @@ pub struct Conductor {
     pub specular_reflectance: Texture,
 }
 
+impl Conductor {
+    /// What is reflected at a cosine, where `specular_reflectance` is this.
+    fn reflected(&self, specular: Rgb, cos: f32) -> Rgb {
+        specular * fresnel::conductor(cos, self.eta, self.k)
+    }
+}
+
 /// The model at a point, seen from above.
 #[derive(Clone, Copy)]
 pub(super) struct ConductorAt<'a> {
@@ -46,7 +53,7 @@ impl Scatter for Conductor {
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        self.specular_reflectance.at(s) * fresnel::conductor(wi.z, self.eta, self.k)
+        self.reflected(self.specular_reflectance.at(s), wi.z)
     }
 
     fn alpha(&self, _s: &Surface) -> Option<f32> {
@@ -72,10 +79,6 @@ impl RoughConductor {
         let alpha = Vec2::new(scalar(&self.alpha_u, s), scalar(&self.alpha_v, s));
         Microfacets::new(self.distribution, alpha * query.roughness_scale)
     }
-
-    fn fresnel(&self, s: &Surface, cos: f32) -> Rgb {
-        self.metal.specular_reflectance.at(s) * fresnel::conductor(cos, self.metal.eta, self.metal.k)
-    }
 }
 
 /// The model at a point, seen from above.
@@ -90,7 +93,7 @@ pub(super) struct RoughConductorAt<'a> {
 
 impl RoughConductorAt<'_> {
     fn fresnel(&self, m: Vec3) -> Rgb {
-        self.specular * fresnel::conductor(self.wi.dot(m), self.metal.eta, self.metal.k)
+        self.metal.reflected(self.specular, self.wi.dot(m))
     }
 
     pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
@@ -133,7 +136,7 @@ impl Scatter for RoughConductor {
             return Rgb::ZERO;
         }
         let (energy, cos) = lobe_albedo(self.distribution, self.facets(s, query).alpha_towards(wi), wi.z);
-        self.fresnel(s, cos) * energy
+        self.metal.reflected(self.metal.specular_reflectance.at(s), cos) * energy
     }
 
     fn alpha(&self, s: &Surface) -> Option<f32> {

@@ -22,16 +22,23 @@ pub struct PlasticParams {
     pub specular_reflectance: Texture,
 }
 
-/// A plastic's colours at a point.
+/// A plastic at a point, for one viewer.
 #[derive(Clone, Copy)]
-pub(super) struct Colours {
-    pub diffuse: Rgb,
+pub(super) struct Coated {
+    /// Factor on the specular reflection.
     pub specular: Rgb,
+    /// Radiance of the base per irradiance through the coating.
+    pub base: Rgb,
+    /// Of drawing the specular lobe.
+    pub probability: f32,
 }
 
 impl PlasticParams {
-    pub(super) fn at(&self, s: &Surface) -> Colours {
-        Colours { diffuse: self.diffuse_reflectance.at(s), specular: self.specular_reflectance.at(s) }
+    /// At a point, for a viewer to whom the coating sends the share `reflected`; `eta` and `internal_reflectance` as for [`Self::base`].
+    pub(super) fn at(&self, s: &Surface, eta: f32, internal_reflectance: f32, reflected: f32, query: Query) -> Coated {
+        let (diffuse, specular) = (self.diffuse_reflectance.at(s), self.specular_reflectance.at(s));
+        let base = self.base(diffuse, eta, internal_reflectance);
+        Coated { specular, base, probability: specular_probability([specular, diffuse], reflected, query) }
     }
 
     /// Radiance of a base of albedo `diffuse`, per irradiance that reaches it through the coating and over the two
@@ -42,16 +49,14 @@ impl PlasticParams {
     }
 }
 
-impl Colours {
-    /// Probability of drawing the specular lobe, of which the coating reflects the share `reflected` at `wi`.
-    /// Mitsuba's rule, with the colours at the point in place of their means over the textures.
-    pub(super) fn specular_probability(&self, reflected: f32, query: Query) -> f32 {
-        if query.lobes != Lobes::ALL {
-            return if query.lobes.contains(Lobes::NON_DIFFUSE) { 1.0 } else { 0.0 };
-        }
-        let (specular, diffuse) = (self.specular.element_sum() * reflected, self.diffuse.element_sum() * (1.0 - reflected));
-        if specular > 0.0 { specular / (specular + diffuse) } else { 0.0 }
+/// Probability of drawing the specular lobe, of which the coating reflects the share `reflected` at `wi`.
+/// Mitsuba's rule, with the colours at the point (specular, diffuse) in place of their means over the textures.
+fn specular_probability([specular, diffuse]: [Rgb; 2], reflected: f32, query: Query) -> f32 {
+    if query.lobes != Lobes::ALL {
+        return if query.lobes.contains(Lobes::NON_DIFFUSE) { 1.0 } else { 0.0 };
     }
+    let (specular, diffuse) = (specular.element_sum() * reflected, diffuse.element_sum() * (1.0 - reflected));
+    if specular > 0.0 { specular / (specular + diffuse) } else { 0.0 }
 }
 
 /// The model, with what its parameters imply.
@@ -83,11 +88,7 @@ pub(super) struct PlasticAt<'a> {
     query: Query,
     /// Share of the light to `wi` that the coating reflects.
     reflected: f32,
-    specular: Rgb,
-    /// Radiance of the base per irradiance through the coating.
-    base: Rgb,
-    /// Of drawing the specular lobe.
-    probability: f32,
+    coated: Coated,
 }
 
 impl PlasticAt<'_> {
@@ -96,14 +97,14 @@ impl PlasticAt<'_> {
             return (Rgb::ZERO, 0.0);
         }
         let pdf = cosine_hemisphere_pdf(wo);
-        let value = self.base * ((1.0 - self.reflected) * (1.0 - self.model.reflected(wo)) * pdf);
-        (value, pdf * (1.0 - self.probability))
+        let value = self.coated.base * ((1.0 - self.reflected) * (1.0 - self.model.reflected(wo)) * pdf);
+        (value, pdf * (1.0 - self.coated.probability))
     }
 
     pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
-        if u < self.probability {
-            let weight = self.specular * (self.reflected / self.probability);
-            return Some(BsdfSample::mirrored(self.wi, weight, self.probability));
+        let Coated { specular, probability, .. } = self.coated;
+        if u < probability {
+            return Some(BsdfSample::mirrored(self.wi, specular * (self.reflected / probability), probability));
         }
         let wo = cosine_hemisphere(v);
         let (value, pdf) = self.eval_pdf(wo);
@@ -114,10 +115,9 @@ impl PlasticAt<'_> {
 impl Scatter for Plastic {
     fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
         let seen = (wi.z > 0.0).then(|| {
-            let (reflected, colours) = (self.reflected(wi), self.params.at(s));
-            let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
-            let probability = colours.specular_probability(reflected, query);
-            PlasticAt { model: self, wi, query, reflected, specular: colours.specular, base, probability }
+            let reflected = self.reflected(wi);
+            let coated = self.params.at(s, self.eta, self.internal_reflectance, reflected, query);
+            PlasticAt { model: self, wi, query, reflected, coated }
         });
         At::some(seen, Model::Plastic)
     }

@@ -288,7 +288,7 @@ impl Scatter for Principled {
     fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
         let point = self.point(s, query);
         let probabilities = self.probabilities(&point, wi, query);
-        At::some(Some(PrincipledAt { model: self, s, wi, query, point, probabilities }), Model::Principled)
+        At::of(Model::Principled(PrincipledAt { model: self, s, wi, query, point, probabilities }))
     }
 
     fn lobes(&self) -> Lobes {

@@ -6,7 +6,7 @@
 
 use super::albedo::{gauss_legendre, lobe_albedo, reflected_mean, transmitted_mean};
 use super::microfacet::{ALPHA_MIN, Distribution, Microfacets};
-use super::plastic::PlasticParams;
+use super::plastic::{Coated, PlasticParams};
 use super::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use super::{At, BsdfSample, Lobes, Model, Query, Scatter, Surface, fresnel, positive_ratio};
 use crate::base::math::{Rgb, reflect};
@@ -77,11 +77,7 @@ pub(super) struct RoughPlasticAt<'a> {
     facets: Microfacets,
     /// Share of the light from the base that gets out to `wi`.
     transmitted: f32,
-    specular: Rgb,
-    /// Radiance of the base per irradiance through the coating.
-    base: Rgb,
-    /// Of drawing the specular lobe.
-    probability: f32,
+    coated: Coated,
 }
 
 impl RoughPlasticAt<'_> {
@@ -89,27 +85,27 @@ impl RoughPlasticAt<'_> {
         if wo.z <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let (wi, facets, p) = (self.wi, &self.facets, self.probability);
+        let (wi, facets, Coated { specular, base, probability: p }) = (self.wi, &self.facets, self.coated);
         let (mut value, mut density) = (Rgb::ZERO, 0.0);
         if self.query.lobes.contains(Lobes::NON_DIFFUSE) {
             let m = (wi + wo).normalize_or_zero();
             let visible = 0.25 * facets.d(m) * facets.g1_over_cos(wi, m);
             if visible > 0.0 {
                 let f = fresnel::dielectric(wi.dot(m), self.model.eta).r;
-                value += self.specular * (f * visible * facets.g1(wo, m));
+                value += specular * (f * visible * facets.g1(wo, m));
                 density += p * visible;
             }
         }
         if self.query.lobes.contains(Lobes::DIFFUSE) {
             let cosine = cosine_hemisphere_pdf(wo);
-            value += self.base * (self.transmitted * self.model.transmitted(wo) * cosine);
+            value += base * (self.transmitted * self.model.transmitted(wo) * cosine);
             density += (1.0 - p) * cosine;
         }
         (value, density)
     }
 
     pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
-        let wo = if u < self.probability {
+        let wo = if u < self.coated.probability {
             reflect(self.wi, self.facets.sample(self.wi, v)).normalize_or_zero()
         } else {
             cosine_hemisphere(v)
@@ -122,11 +118,9 @@ impl RoughPlasticAt<'_> {
 impl Scatter for RoughPlastic {
     fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
         let seen = (wi.z > 0.0).then(|| {
-            let (transmitted, colours) = (self.transmitted(wi), self.params.at(s));
-            let base = self.params.base(colours.diffuse, self.eta, self.internal_reflectance);
-            let probability = colours.specular_probability(1.0 - transmitted, query);
-            let facets = self.facets(query);
-            RoughPlasticAt { model: self, wi, query, facets, transmitted, specular: colours.specular, base, probability }
+            let transmitted = self.transmitted(wi);
+            let coated = self.params.at(s, self.eta, self.internal_reflectance, 1.0 - transmitted, query);
+            RoughPlasticAt { model: self, wi, query, facets: self.facets(query), transmitted, coated }
         });
         At::some(seen, Model::RoughPlastic)
     }

@@ -29,15 +29,15 @@ impl TwoSided {
     }
 }
 
-/// Direction `v` as the side that `w` sees has it: mirrored behind.
-fn towards(w: Vec3, v: Vec3) -> Vec3 {
-    if w.z > 0.0 { v } else { v.with_z(-v.z) }
+/// A direction as the side that it sees has it: mirrored behind.
+fn towards(w: Vec3) -> Vec3 {
+    if w.z > 0.0 { w } else { w.with_z(-w.z) }
 }
 
 impl Scatter for TwoSided {
     fn at<'a>(&'a self, s: &'a Surface, wi: Vec3, query: Query) -> At<'a> {
         let front = wi.z > 0.0;
-        self.side(wi).at(s, towards(wi, wi), query).on_side(!front)
+        self.side(wi).at(s, towards(wi), query).on_side(!front)
     }
 
     fn prefetch(&self, s: &Surface) {
@@ -49,19 +49,19 @@ impl Scatter for TwoSided {
     }
 
     fn diffuse_out(&self, s: &Surface, wi: Vec3) -> Rgb {
-        self.side(wi).diffuse_out(s, towards(wi, wi))
+        self.side(wi).diffuse_out(s, towards(wi))
     }
 
     fn diffuse_in(&self, s: &Surface, wo: Vec3) -> f32 {
-        self.side(wo).diffuse_in(s, towards(wo, wo))
+        self.side(wo).diffuse_in(s, towards(wo))
     }
 
     fn diffuse_albedo(&self, s: &Surface, wi: Vec3) -> Rgb {
-        self.side(wi).diffuse_albedo(s, towards(wi, wi))
+        self.side(wi).diffuse_albedo(s, towards(wi))
     }
 
     fn glossy_albedo(&self, s: &Surface, wi: Vec3, query: Query) -> Rgb {
-        self.side(wi).glossy_albedo(s, towards(wi, wi), query)
+        self.side(wi).glossy_albedo(s, towards(wi), query)
     }
 
     fn alpha(&self, s: &Surface) -> Option<f32> {

@@ -123,6 +123,6 @@ impl Image {
 
 #[inline(always)]
 fn of_bytes(rgb: &[u8], linear: &[f32; 256], i: usize) -> Rgb {
-    let [r, g, b] = [0, 1, 2].map(|k| rgb[3 * i..3 * i + 3][k]);
-    Rgb::new(linear[r as usize], linear[g as usize], linear[b as usize])
+    let pixel = &rgb[3 * i..3 * i + 3];
+    Rgb::new(linear[pixel[0] as usize], linear[pixel[1] as usize], linear[pixel[2] as usize])
 }

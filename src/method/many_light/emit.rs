@@ -116,12 +116,11 @@ impl<'w> Site<'w> {
         let receiver = Receiver { p: self.surface.p, n: self.n };
         for i in 0..count {
             let [x, y, choice, _] = Sampler::new(stream, i).next_4d();
-            let Some(light) = world.lights.sample(&world.scene, &receiver, choice, Vec2::new(x, y)) else { continue };
+            let Some(light) = world.light(&receiver, choice, Vec2::new(x, y)) else { continue };
             if light.wi.dot(self.n) <= 0.0 || light.weight == Rgb::ZERO || !light.weight.is_finite() {
                 continue;
             }
-            let ray = if light.distance.is_finite() { self.surface.spawn_to(light.point) } else { self.surface.spawn(light.wi) };
-            if !world.occluded(&ray) {
+            if !world.occluded(&light.shadow_ray(&self.surface)) {
                 sum.add(&self.reflected(light.wi, light.weight / count as f32), 1.0);
             }
         }

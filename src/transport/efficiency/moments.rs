@@ -31,22 +31,22 @@ struct Cell {
 }
 
 impl Cell {
+    /// The level of the finest key.
+    const FINEST: u64 = 1;
+
     /// From the finest to what is known of the material all around.
     fn keys(self) -> impl Iterator<Item = u64> {
-        let Self { at, side, direction, material } = self;
-        let key = move |level: u64| {
-            let (at, side, direction) = match level {
-                1 => (at, side, direction),
-                2 => (at, side, 0),
-                _ => (at.map(|x| x >> 2), 0, 0),
-            };
-            at.iter().fold(level, |k, x| k << 8 | x) << 32 | side << 29 | direction << 24 | (material & 0xff_ffff)
-        };
-        (1..=3).map(key)
+        (Self::FINEST..=3).map(move |level| self.key(level))
     }
 
-    fn finest(self) -> u64 {
-        self.keys().next().unwrap_or_default()
+    fn key(self, level: u64) -> u64 {
+        let Self { at, side, direction, material } = self;
+        let (at, side, direction) = match level {
+            Self::FINEST => (at, side, direction),
+            2 => (at, side, 0),
+            _ => (at.map(|x| x >> 2), 0, 0),
+        };
+        at.iter().fold(level, |k, x| k << 8 | x) << 32 | side << 29 | direction << 24 | (material & 0xff_ffff)
     }
 }
 
@@ -144,7 +144,8 @@ impl Tally {
     /// Takes in an estimate, of a kind, of the light that `s` scatters, to `wo` where its material has other than diffuse lobes.
     pub fn record(&mut self, s: &Surface, wo: Option<Vec3>, kind: Kind, estimate: &Estimate) {
         let cell = self.grid.cell(s, wo);
-        self.cells.entry(cell.finest()).or_insert((cell, [Sums::default(); 2])).1[kind as usize].add(&Sums::of(estimate));
+        self.cells.entry(cell.key(Cell::FINEST)).or_insert((cell, [Sums::default(); 2])).1[kind as usize]
+            .add(&Sums::of(estimate));
     }
 
     /// Takes in all of another one.
@@ -157,10 +158,10 @@ impl Tally {
 
     /// What is to be believed of it.
     pub fn moments(&self) -> Moments {
-        let mut fine: Vec<_> = self.cells.values().collect();
-        fine.sort_by_key(|(cell, _)| cell.finest());
+        let mut fine: Vec<_> = self.cells.iter().collect();
+        fine.sort_by_key(|(key, _)| **key);
         let mut all: HashMap<u64, [Sums; 2], BuildHasherDefault<Mixed>> = HashMap::default();
-        for (cell, sums) in fine {
+        for (_, (cell, sums)) in fine {
             for key in cell.keys() {
                 let whole = all.entry(key).or_default();
                 whole.iter_mut().zip(sums).for_each(|(whole, sums)| whole.add(sums));
