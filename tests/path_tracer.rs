@@ -14,10 +14,11 @@ use reprobe::method::path_trace::{PathTraceParams, path_trace, path_trace_full};
 use reprobe::scene::{Camera, Emitter};
 use reprobe::transport::light_tree::Receiver;
 use reprobe::transport::lights::Lights;
+use reprobe::transport::mirrors::Mirrors;
 use reprobe::transport::path::{PathParams, radiance, scattered, trace_layers, transmitted_irradiance};
 use reprobe::transport::{Sampler, World};
 use reprobe::view::layers::LayerImages;
-use room::Room;
+use room::{Room, two_sided};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
 /// Mean of independent estimates and the standard deviation of the mean, per channel.
@@ -250,6 +251,88 @@ fn a_mirror_shows_the_lamp_in_the_glossy_layer() {
     let layers = trace_layers(&world, &Ray::new(Vec3::Y, Vec3::NEG_Y), &PathParams::default(), &mut Sampler::new(1, 1));
     assert!((layers.glossy - Rgb::splat(2.7)).abs().max_element() < 1e-4, "{layers:?}");
     assert_eq!((layers.diffuse, layers.emission), (Rgb::ZERO, Rgb::ZERO));
+}
+
+fn mirror(reflectance: Rgb) -> Bsdf {
+    let specular_reflectance = Texture::Constant(reflectance);
+    Bsdf::Conductor(Conductor { eta: Rgb::ZERO, k: Rgb::ONE, specular_reflectance })
+}
+
+/// A floor with a wall at x = -1 that is a mirror, and, where that is wanted, another at z = -1; and a lamp over it that shines down.
+fn mirrored_floor(floor: Bsdf, reflectance: Rgb, corner: bool) -> World {
+    let mut room = Room::default();
+    room.rectangle(Vec3::ZERO, Vec3::X * 5.0, Vec3::Z * -5.0, floor);
+    room.rectangle(Vec3::new(-1.0, 2.0, 0.0), Vec3::Z * -5.0, Vec3::Y * 2.0, mirror(reflectance));
+    if corner {
+        room.rectangle(Vec3::new(0.0, 2.0, -1.0), Vec3::X * 5.0, Vec3::Y * 2.0, mirror(reflectance));
+    }
+    let lamp = room.rectangle(Vec3::new(-0.1, 1.5, 0.0), Vec3::X * 0.4, Vec3::Z * 0.6, diffuse(0.0));
+    room.emit(lamp, Rgb::splat(4.0));
+    room.world()
+}
+
+#[test]
+fn light_by_way_of_a_mirror_is_that_of_the_lamps_image() {
+    let reflectance = Rgb::new(0.9, 0.6, 0.3);
+    let world = mirrored_floor(diffuse(0.5), reflectance, false);
+    assert_eq!(world.mirrors.count(), 1);
+    let foot = Vec3::new(-0.4, 0.0, 0.1);
+    let ray = Ray::new(foot + Vec3::Y, Vec3::NEG_Y);
+    // Differential element below a parallel rectangle, whose edges lie so far from it in x and z (Howell's catalogue, B-4).
+    let corner = |x: f32, z: f32| {
+        let (a, b) = (x / 1.5, z / 1.5);
+        let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+        0.5 * FRAC_1_PI * (a / ra * (b / ra).atan() + b / rb * (a / rb).atan())
+    };
+    let factor = |x: [f32; 2]| {
+        let strip = |z: f32| corner(x[1], z) - corner(x[0], z);
+        strip(0.6 - 0.1) + strip(0.6 + 0.1)
+    };
+    // The lamp reaches from -.5 to .3, its image from -2.3 to -1.5.
+    let (direct, image) = (factor([-0.1, 0.7]), factor([-1.9, -1.1]));
+    let params = PathParams { max_depth: 2, ..PathParams::default() };
+    let found = estimate(8192, 4, |s| radiance(&world, &ray, &params, s));
+    found.assert_is(0.5 * 4.0 * (Rgb::splat(direct) + reflectance * image), 0.005);
+}
+
+#[test]
+fn emitters_drawn_in_mirrors_change_the_noise_alone() {
+    let endless = PathParams::default();
+    for (seed, floor, corner) in
+        [(1, diffuse(0.7), false), (2, diffuse(0.7), true), (3, rough_plastic(0.15), true), (4, mirror(Rgb::splat(0.8)), true)]
+    {
+        let mut world = mirrored_floor(floor, Rgb::splat(0.9), corner);
+        let ray = Ray::new(Vec3::new(0.4, 1.0, 1.0), Vec3::new(-0.4, -1.0, -0.6).normalize());
+        let with = estimate(16384, seed, |s| radiance(&world, &ray, &endless, s));
+        world.mirrors = Mirrors::default();
+        let without = estimate(16384, 10 + seed, |s| radiance(&world, &ray, &endless, s));
+        with.assert_agrees(&without, 0.02);
+        if seed < 3 {
+            assert!(with.sigma.x < 0.5 * without.sigma.x, "{} where scattering alone has {}", with.sigma, without.sigma);
+        }
+    }
+}
+
+#[test]
+fn panes_reflect_outside_and_lamps_without_extent_are_not_drawn() {
+    let pane = |lamp: bool| {
+        let mut room = Room::default();
+        room.rectangle(Vec3::NEG_Y, Vec3::X * 2.0, Vec3::Z * -2.0, diffuse(0.5));
+        // Its faces' fronts are outside, but they reflect on both sides.
+        for side in [-1.0, 1.0] {
+            room.rectangle(Vec3::Z * 0.01 * side, Vec3::X * side, Vec3::Y, two_sided(mirror(Rgb::ONE)));
+        }
+        if lamp {
+            let lamp = room.rectangle(Vec3::Y * 3.0, Vec3::X * 0.4, Vec3::Z * 0.4, diffuse(0.0));
+            room.emit(lamp, Rgb::ONE);
+        } else {
+            room.light(Emitter::Point { position: Vec3::Y * 3.0, intensity: Rgb::ONE });
+        }
+        room.world()
+    };
+    assert_eq!(pane(true).mirrors.count(), 2);
+    let world = pane(false);
+    assert_eq!(world.mirrors.count(), 0);
 }
 
 #[test]

@@ -173,8 +173,13 @@ impl Lights {
             return Some(sample);
         }
         let rest = (place - choice as f32).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
-        let (index, probability) = self.tree.sample(receiver, rest)?;
-        let probability = probability / shares as f32;
+        self.sample_near(scene, receiver, rest, v, self.share())
+    }
+
+    /// [`Lights::sample`] among the emitters at a finite distance, which have this share of the choice.
+    pub(super) fn sample_near(&self, scene: &Scene, receiver: &Receiver, u: f32, v: Vec2, share: f32) -> Option<LightSample> {
+        let (index, probability) = self.tree.sample(receiver, u)?;
+        let probability = probability * share;
         match &self.near[index as usize] {
             Near::Triangle(triangle) => triangle.sample(scene, receiver.p, probability, v),
             Near::Round(round) => {
@@ -204,21 +209,22 @@ impl Lights {
 
     /// Density with which [`Lights::sample`] finds the emitting point `s`.
     pub fn pdf_surface(&self, scene: &Scene, receiver: &Receiver, s: &Surface) -> f32 {
+        self.share() * self.pdf_near(scene, receiver, s)
+    }
+
+    /// Density with which [`Lights::sample_near`] finds it where the share is 1.
+    pub(super) fn pdf_near(&self, scene: &Scene, receiver: &Receiver, s: &Surface) -> f32 {
         let Some(first) = s.emitter.and_then(|e| self.first.get(e as usize).copied().flatten()) else { return 0.0 };
         if let Some(Near::Round(round)) = self.near.get(first as usize) {
             let round = &scene.geometry.rounds[*round as usize];
-            return self.share() * self.tree.probability(receiver, first) * round_light::pdf(round, receiver.p, s.p);
+            return self.tree.probability(receiver, first) * round_light::pdf(round, receiver.p, s.p);
         }
         let index = first + (s.triangle - scene.geometry.objects[s.object as usize].triangles.start);
         let Some(Near::Triangle(triangle)) = self.near.get(index as usize) else { return 0.0 };
         let to_light = s.p - receiver.p;
         let distance = to_light.length();
         let cos = s.ng.dot(to_light).abs() / distance;
-        if cos > 0.0 {
-            self.share() * self.tree.probability(receiver, index) * distance * distance / (triangle.area * cos)
-        } else {
-            0.0
-        }
+        if cos > 0.0 { self.tree.probability(receiver, index) * distance * distance / (triangle.area * cos) } else { 0.0 }
     }
 
     /// Density with which [`Lights::sample`] finds the environment in direction `d`.

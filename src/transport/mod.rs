@@ -10,6 +10,7 @@ pub mod light_tree;
 mod light_triangle;
 pub mod lights;
 mod met;
+pub mod mirrors;
 pub mod outlook;
 pub mod path;
 mod places;

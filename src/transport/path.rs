@@ -152,7 +152,7 @@ pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sam
         return world.seen(ray).map_or(Rgb::ZERO, of);
     }
     let from = Receiver { p: ray.o, n: Vec3::ZERO };
-    let start = Start { ray: *ray, from, found: Found { pdf: 1.0, delta: true }, eta: 1.0, depth: 0 };
+    let start = Start { ray: *ray, from, found: Found::SEEN, eta: 1.0, depth: 0 };
     keep_finite(incident(world, start, None, params, sampler))
 }
 
@@ -173,7 +173,7 @@ fn past_emitters(world: &World, mut surface: Surface, mut wo: Vec3, params: &Pat
         let ray = surface.spawn(surface.frame.to_world(sample.wo));
         if sample.wo.z * wi.z > 0.0 {
             let from = Receiver { p: surface.p, n: Vec3::ZERO };
-            let start = Start { ray, from, found: Found { pdf: sample.pdf, delta: true }, eta: sample.eta, depth: depth + 1 };
+            let start = Start { ray, from, found: Found::SEEN, eta: sample.eta, depth: depth + 1 };
             return keep_finite(sum + throughput * incident(world, start, None, params, sampler));
         }
         let Some(next) = world.intersect(&ray) else { return sum };
@@ -210,8 +210,8 @@ enum Measure<'a> {
 
 /// A point of a path where light arrives.
 pub(super) struct Vertex<'a> {
-    world: &'a World,
-    surface: &'a Surface,
+    pub(super) world: &'a World,
+    pub(super) surface: &'a Surface,
     measure: Measure<'a>,
 }
 
@@ -236,13 +236,16 @@ fn integrate(vertex: &Vertex, from: Receiver, known: Option<KnownDiffuse>, param
     }
     let [[light_x, light_y, light_choice, _], [x, y, lobe, _]] = sampler.next_two_4d();
     let mut sum = vertex.direct(world.light(&from, light_choice, Vec2::new(light_x, light_y)));
+    if params.max_depth > 1 {
+        sum += vertex.in_mirrors(&from, light_choice, Vec2::new(light_x, light_y));
+    }
     // Direct light alone, and no ray could meet any.
     if params.max_depth == 1 && world.lights.never_met {
         return keep_finite(sum);
     }
     if let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) {
         let ray = vertex.surface.spawn(vertex.surface.frame.to_world(sample.wo));
-        let start = Start { ray, from, found: Found { pdf: sample.pdf, delta: sample.delta }, eta: sample.eta, depth: 1 };
+        let start = Start { ray, from, found: Found::by(&sample), eta: sample.eta, depth: 1 };
         sum += sample.weight * incident(world, start, known, params, sampler);
     }
     keep_finite(sum)
@@ -279,11 +282,15 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
                 return sum;
             }
         }
+        let behind = world.mirrors.behind(&surface, &from, found);
         from = receiver(world, &surface, wo);
         // Before the textures are read, which have been asked for only now.
         let light = world.light(&from, light_choice, Vec2::new(light_x, light_y));
         let vertex = Vertex::scattering(world, &surface, wo, query);
         sum += throughput * vertex.direct(light);
+        if params.max_depth - depth > 1 {
+            sum += throughput * vertex.in_mirrors(&from, light_choice, Vec2::new(light_x, light_y));
+        }
         let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) else { return sum };
         throughput *= sample.weight;
         eta *= sample.eta;
@@ -295,7 +302,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
             }
             throughput /= lives;
         }
-        found = Found { pdf: sample.pdf, delta: sample.delta };
+        (from, found) = behind.unwrap_or((from, Found::by(&sample)));
         ray = surface.spawn(surface.frame.to_world(sample.wo));
     }
 }
@@ -336,7 +343,7 @@ impl<'a> Vertex<'a> {
 
     /// What radiance from the local direction `wo` is multiplied with, cosine included, and the density (solid angle) with
     /// which [`Vertex::sample`] finds it.
-    fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
+    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
         match &self.measure {
             Measure::Scattering(at) => at.eval_pdf(wo),
             &Measure::Irradiance { side } if wo.z * side > 0.0 => {

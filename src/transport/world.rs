@@ -5,6 +5,7 @@ use super::facet::Facet;
 use super::light_sample::LightSample;
 use super::light_tree::Receiver;
 use super::lights::Lights;
+use super::mirrors::Mirrors;
 use super::outlook::Outlook;
 use crate::base::math::Rgb;
 use crate::base::ray::{Hit, Ray};
@@ -24,6 +25,8 @@ pub struct World {
     pub bvh: Arc<Bvh>,
     /// Its emitters, ready for sampling.
     pub lights: Arc<Lights>,
+    /// In which emitters are drawn, too.
+    pub mirrors: Mirrors,
     pub(crate) facets: Arc<Vec<Facet>>,
     /// What an animation adds to the scene's own triangles.
     pub(crate) added: Option<Box<Added>>,
@@ -56,7 +59,7 @@ impl World {
         let bvh = Bvh::build(&scene, &|t| keep(&scene, t)).into();
         let lights = Lights::new(&scene).into();
         let facets = facets(&scene, 0).into();
-        Self { scene, bvh, lights, facets, added: None, relit: false }
+        Self { scene, bvh, lights, mirrors: Mirrors::default(), facets, added: None, relit: false }.with_mirrors()
     }
 
     /// The world of a frame: this one's, which is that of `animation`'s scene, with the animation's lights, materials and objects. A world
@@ -69,7 +72,13 @@ impl World {
             .then(|| Box::new(Added { bvh: self.bvh.beside(&scene, first), facets: facets(&scene, first) }));
         let relit = own.objects.iter().zip(&all.objects).any(|(a, b)| a.emitter != b.emitter);
         let lights = if animation.changes_light() { self.lights.of(&scene).into() } else { self.lights.clone() };
-        Self { scene, bvh: self.bvh.clone(), lights, facets: self.facets.clone(), added, relit }
+        let (bvh, facets, mirrors) = (self.bvh.clone(), self.facets.clone(), Mirrors::default());
+        Self { scene, bvh, lights, mirrors, facets, added, relit }.with_mirrors()
+    }
+
+    fn with_mirrors(mut self) -> Self {
+        self.mirrors = Mirrors::of(&self);
+        self
     }
 
     /// The same world, whose paths draw little of its environment but what is seen from where they are.

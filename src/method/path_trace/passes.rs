@@ -157,7 +157,7 @@ pub(super) fn full(walk: &mut Walk, ray: &Ray, [weight]: &[Rgb; 1], sampler: &mu
     let world = walk.world;
     let numbers = walk.numbers(sampler);
     let Some(surface) = world.seen(ray) else { return ([world.backdrop(ray.d)], RAY_COST) };
-    let start = Start { weight: *weight, eta: 1.0, depth: 0 };
+    let start = Start::seen(*weight);
     let scattered = walk.scattered(numbers, &surface, -ray.d, Query::default(), start, sampler);
     let emitted = world.lights.emitted(&world.scene, &surface, -ray.d);
     ([emitted + scattered.light], RAY_COST + scattered.cost)
@@ -175,7 +175,7 @@ pub(super) fn layers(walk: &mut Walk, ray: &Ray, weights: &[Rgb; 3], sampler: &m
     for (k, lobes) in [Lobes::DIFFUSE, Lobes::NON_DIFFUSE].into_iter().enumerate() {
         if present.intersects(lobes) {
             let query = Query { lobes, ..Query::default() };
-            let start = Start { weight: weights[k + 1], eta: 1.0, depth: 0 };
+            let start = Start::seen(weights[k + 1]);
             let scattered = walk.scattered(numbers[k], &surface, -ray.d, query, start, &mut branches[k]);
             layers[k + 1] = scattered.light;
             cost += scattered.cost;

@@ -57,6 +57,15 @@ pub struct Start {
     pub eta: f32,
     /// Vertices before it.
     pub depth: u32,
+    /// On a mirror: where the ray seems to come from that goes on from it, and how that was found.
+    behind: Option<(Receiver, Found)>,
+}
+
+impl Start {
+    /// The first vertex, which a camera sees.
+    pub fn seen(weight: Rgb) -> Self {
+        Self { weight, eta: 1.0, depth: 0, behind: None }
+    }
 }
 
 /// A vertex that a path has reached.
@@ -103,12 +112,17 @@ impl Walk<'_> {
         let light = |[x, y, choice, _]: [f32; 4]| self.world.light(&from, choice, Vec2::new(x, y));
         // Before the textures are read, which have been asked for only now.
         let first = if emitters > 0 { light(emitter) } else { None };
+        let in_mirrors = self.params.max_depth - start.depth > 1;
         let vertex = Vertex::scattering(self.world, s, wo, query);
         let share = Rgb::splat(1.0 / direct);
         for k in 0..emitters {
-            let light = if k == 0 { first } else { light(sampler.branch(k << 16 | start.depth).next_4d()) };
-            let light = keep_finite(vertex.direct(light));
-            let estimate = Estimate { light, cost: DIRECT_COST };
+            let numbers = if k == 0 { emitter } else { sampler.branch(k << 16 | start.depth).next_4d() };
+            let mut direct = vertex.direct(if k == 0 { first } else { light(numbers) });
+            if in_mirrors {
+                let [x, y, choice, _] = numbers;
+                direct += vertex.in_mirrors(&from, choice, Vec2::new(x, y));
+            }
+            let estimate = Estimate { light: keep_finite(direct), cost: DIRECT_COST };
             self.record(&reached, Kind::Direct, &estimate);
             sum.add(estimate, share);
         }
@@ -161,8 +175,8 @@ impl Walk<'_> {
             weight /= lives;
         }
         let ray = at.s.spawn(at.s.frame.to_world(sample.wo));
-        let found = Found { pdf: sample.pdf, delta: sample.delta };
-        let next = self.incident(&ray, from, found, Start { weight, eta, depth }, sampler);
+        let (from, found) = at.start.behind.unwrap_or((*from, Found::by(&sample)));
+        let next = self.incident(&ray, &from, found, Start { weight, eta, depth, behind: None }, sampler);
         let estimate = Estimate { light: keep_finite(sample.weight * next.light), cost: RAY_COST + next.cost };
         self.record(at, Kind::Onward, &estimate);
         Estimate { light: estimate.light / lives, ..estimate }
@@ -183,6 +197,7 @@ impl Walk<'_> {
             sum.light = light * weight;
         }
         if at.depth < self.params.max_depth {
+            let at = Start { behind: world.mirrors.behind(&s, from, found), ..at };
             sum.add(self.scattered(numbers, &s, wo, Query::default(), at, sampler), Rgb::ONE);
         }
         sum

@@ -1,0 +1,237 @@
+//! Plane mirrors: light that comes by way of one arrives as if the mirror were a window, and the scene behind it again.
+//!
+//! *Ours*: a path finds a lamp in a mirror only where scattering happens to go there, so that a wall with a window's reflection on it is
+//! full of bright dots. An emitter is therefore drawn in each of a scene's few large mirrors, too: for where the receiver seems to be behind it, and
+//! weighted against scattering as any other emitter sample. Lamps without extent are left out, which no scattered ray can meet either:
+//! what is computed stays what it is.
+
+use super::light_tree::Receiver;
+use super::lights::Near;
+use super::met::{Found, power_heuristic};
+use super::path::Vertex;
+use super::{Sampler, World};
+use crate::base::math::{Basis, Rgb};
+use crate::base::ray::{Hit, Ray};
+use crate::material::Surface;
+use crate::material::bsdf::warp::cosine_hemisphere;
+use crate::material::bsdf::{Bsdf, Query};
+use crate::scene::normals::unit_normal;
+use crate::scene::{Geometry, Object};
+use glam::{Vec2, Vec3};
+
+/// Most mirrors in which emitters are drawn; the largest.
+const MOST: usize = 4;
+
+/// Least area of a mirror, as a share of the square of the scene's diagonal, and of the largest mirror.
+const LEAST: [f32; 2] = [1e-4, 0.1];
+
+/// Rays that tell whether a side of a mirror is open: half of them must get farther than this share of the root of its area. The
+/// inside of a pane is not.
+const LOOKS: u32 = 64;
+const OPEN: f32 = 0.1;
+
+/// Planes of one object that are told apart; what curves has more.
+const PLANES: usize = 64;
+
+/// Largest difference of unit normals in a plane, and of heights over it as a share of the scene's diagonal.
+const EVEN: f32 = 1e-4;
+
+/// A scene's large plane mirrors.
+#[derive(Debug, Default)]
+pub struct Mirrors {
+    /// At most [`MOST`].
+    planes: Vec<Mirror>,
+    /// Their triangles, sorted, each with its plane.
+    triangles: Vec<(u32, u8)>,
+}
+
+/// A part of a plane that reflects.
+#[derive(Debug)]
+struct Mirror {
+    /// Unit, on the front.
+    n: Vec3,
+    /// n · x of the plane's points.
+    height: f32,
+    axes: Basis,
+    /// Least and greatest coordinates of its corners along the axes.
+    corners: [Vec2; 2],
+    /// Whether front and back reflect.
+    sides: [bool; 2],
+    area: f32,
+    triangles: Vec<u32>,
+}
+
+impl Mirrors {
+    /// Those of a world; none where no emitter would be drawn in them.
+    pub(super) fn of(world: &World) -> Self {
+        let World { scene, lights, .. } = world;
+        if !lights.near.iter().any(|near| !matches!(near, Near::Delta(_))) {
+            return Self::default();
+        }
+        let (low, high) = scene.geometry.bounds();
+        let diagonal = low.distance(high);
+        let of_object = |object: &Object| {
+            let material = &scene.materials[object.material as usize];
+            let sides = sides(&material.bsdf);
+            let mirrors = material.opacity.is_none() && sides != [false; 2];
+            if mirrors { planes(&scene.geometry, object, sides, EVEN * diagonal) } else { Vec::new() }
+        };
+        let mut planes: Vec<Mirror> = scene.geometry.objects.iter().flat_map(of_object).collect();
+        planes.sort_by(|a, b| b.area.total_cmp(&a.area));
+        let least = planes.first().map_or(0.0, |largest| (LEAST[0] * diagonal * diagonal).max(LEAST[1] * largest.area));
+        planes.retain_mut(|plane| {
+            plane.area >= least && {
+                plane.sides = [0, 1].map(|side| plane.sides[side] && plane.is_open(world, side));
+                plane.sides != [false; 2]
+            }
+        });
+        planes.truncate(MOST);
+        let of = |(i, plane): (usize, &Mirror)| plane.triangles.iter().map(|&t| (t, i as u8)).collect::<Vec<_>>();
+        let mut triangles: Vec<_> = planes.iter().enumerate().flat_map(of).collect();
+        triangles.sort_unstable();
+        Self { planes, triangles }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.planes.len()
+    }
+
+    /// The mirror that a triangle belongs to.
+    fn of_triangle(&self, triangle: u32) -> Option<&Mirror> {
+        let found = self.triangles.binary_search_by_key(&triangle, |t| t.0).ok()?;
+        self.planes.get(self.triangles[found].1 as usize)
+    }
+
+    /// Where a ray seems to come from, and how it was found, that goes on from the surface of a mirror: from behind it. `None` elsewhere, and where
+    /// no emitter sample in this mirror competes with it.
+    #[inline]
+    pub(super) fn behind(&self, s: &Surface, from: &Receiver, found: Found) -> Option<(Receiver, Found)> {
+        if self.planes.is_empty() || found.delta || found.mirrored {
+            return None;
+        }
+        Some((self.of_triangle(s.triangle)?.image(from)?, Found { mirrored: true, ..found }))
+    }
+}
+
+impl Vertex<'_> {
+    /// Next-event estimation by way of every mirror, by the numbers that [`Vertex::direct`]'s sample was drawn by.
+    #[inline]
+    pub(super) fn in_mirrors(&self, from: &Receiver, choice: f32, v: Vec2) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        for mirror in &self.world.mirrors.planes {
+            sum += self.in_mirror(mirror, from, choice, v).unwrap_or(Rgb::ZERO);
+        }
+        sum
+    }
+
+    fn in_mirror(&self, mirror: &Mirror, from: &Receiver, choice: f32, v: Vec2) -> Option<Rgb> {
+        let world = self.world;
+        let behind = mirror.image(from)?;
+        let light = world.lights.sample_near(&world.scene, &behind, choice, v, 1.0)?;
+        if light.delta || light.weight == Rgb::ZERO || !mirror.is_passed(&behind, light.wi, light.distance) {
+            return None;
+        }
+        let wi = mirror.reflected(light.wi);
+        let (value, pdf) = self.eval_pdf(self.surface.frame.to_local(wi));
+        if value == Rgb::ZERO {
+            return None;
+        }
+        let surface = world.intersect(&self.surface.spawn(wi))?;
+        if !std::ptr::eq(mirror, world.mirrors.of_triangle(surface.triangle)?) {
+            return None;
+        }
+        let reflection = Vertex::scattering(world, &surface, -wi, Query::default()).sample(0.5, Vec2::splat(0.5))?;
+        let seen = !world.occluded(&light.shadow_ray(&surface));
+        seen.then(|| light.weight * value * reflection.weight * power_heuristic(light.pdf, pdf))
+    }
+}
+
+impl Mirror {
+    /// A receiver as a mirror shows it; `None` on a side that does not reflect.
+    fn image(&self, of: &Receiver) -> Option<Receiver> {
+        let above = self.n.dot(of.p) - self.height;
+        let reflects = self.sides[usize::from(above < 0.0)] && above != 0.0;
+        reflects.then(|| Receiver { p: of.p - 2.0 * above * self.n, n: self.reflected(of.n) })
+    }
+
+    /// Whether much can be seen from the front (0), or from the back (1).
+    fn is_open(&self, world: &World, side: usize) -> bool {
+        let near = OPEN * self.area.sqrt();
+        let free = |i: &u32| {
+            let [choice, x, y, lobe] = Sampler::new(side as u32, *i).next_4d();
+            let triangle = self.triangles[(choice * self.triangles.len() as f32) as usize];
+            let (u, v) = if x + y < 1.0 { (x, y) } else { (1.0 - x, 1.0 - y) };
+            let surface = world.surface(&Hit { t: 0.0, triangle, u, v });
+            let local = cosine_hemisphere(Vec2::new(lobe, (*i as f32 + 0.5) / LOOKS as f32));
+            let d = self.axes.to_world(if side == 0 { local } else { -local });
+            !world.occluded(&Ray { t_max: near, ..surface.spawn(d) })
+        };
+        (0..LOOKS).filter(free).count() as u32 >= LOOKS / 2
+    }
+
+    /// A direction as the mirror shows it.
+    fn reflected(&self, d: Vec3) -> Vec3 {
+        d - 2.0 * self.n.dot(d) * self.n
+    }
+
+    /// Whether the way from an image behind the mirror, in a unit direction and so far, may lead through it.
+    fn is_passed(&self, from: &Receiver, d: Vec3, distance: f32) -> bool {
+        let t = (self.height - self.n.dot(from.p)) / self.n.dot(d);
+        if !(t > 0.0 && t < distance) {
+            return false;
+        }
+        let at = in_plane(&self.axes, from.p + d * t);
+        at.cmpge(self.corners[0]).all() && at.cmple(self.corners[1]).all()
+    }
+}
+
+fn in_plane(axes: &Basis, p: Vec3) -> Vec2 {
+    Vec2::new(axes.s.dot(p), axes.t.dot(p))
+}
+
+/// Whether a model is a mirror to those before it and behind it.
+fn sides(bsdf: &Bsdf) -> [bool; 2] {
+    let is_mirror = |bsdf: &Bsdf| matches!(bsdf, Bsdf::Conductor(_));
+    match bsdf {
+        Bsdf::TwoSided(both) => [is_mirror(&both.front), is_mirror(&both.back)],
+        one => [is_mirror(one), false],
+    }
+}
+
+/// The planes that an object's flat triangles lie in, the first [`PLANES`] of them; `thin` is how far apart heights in one plane may be.
+fn planes(geometry: &Geometry, object: &Object, sides: [bool; 2], thin: f32) -> Vec<Mirror> {
+    let mut planes: Vec<Mirror> = Vec::new();
+    for triangle in object.triangles.clone().filter(|&t| geometry.round(t).is_none()) {
+        let corners = geometry.corners(triangle);
+        let Some(n) = front(geometry, object, triangle) else { continue };
+        let height = n.dot(corners[0]);
+        let same = |plane: &Mirror| plane.n.distance(n) < EVEN && (plane.height - height).abs() < thin;
+        let found = planes.iter().position(same).unwrap_or(planes.len());
+        if found == planes.len() {
+            if planes.len() == PLANES {
+                continue;
+            }
+            let corners = [Vec2::INFINITY, Vec2::NEG_INFINITY];
+            planes.push(Mirror { n, height, axes: Basis::from_normal(n), corners, sides, area: 0.0, triangles: Vec::new() });
+        }
+        let plane = &mut planes[found];
+        plane.triangles.push(triangle);
+        plane.area += 0.5 * geometry.area_normal(triangle).length();
+        for at in corners.map(|p| in_plane(&plane.axes, p)) {
+            plane.corners = [plane.corners[0].min(at - thin), plane.corners[1].max(at + thin)];
+        }
+    }
+    planes
+}
+
+/// The unit normal of a triangle's front; `None` where it is shaded as if it curved.
+fn front(geometry: &Geometry, object: &Object, triangle: u32) -> Option<Vec3> {
+    let n = unit_normal(geometry.corners(triangle))?;
+    if object.face_normals {
+        return Some(n);
+    }
+    let normals = geometry.triangles[triangle as usize].map(|i| geometry.normals[i as usize]);
+    let n = n * 1f32.copysign(n.dot(normals[0]));
+    normals.iter().all(|other| other.distance(n) < EVEN).then_some(n)
+}
