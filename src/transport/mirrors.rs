@@ -43,6 +43,15 @@ pub struct Mirrors {
     planes: Vec<Mirror>,
     /// Their triangles, sorted, each with its plane.
     triangles: Vec<(u32, u8)>,
+    /// Around all emitters that are drawn in them.
+    lamps: Ball,
+}
+
+/// A centre and a radius.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ball {
+    centre: Vec3,
+    radius: f32,
 }
 
 /// A part of a plane that reflects.
@@ -55,6 +64,8 @@ struct Mirror {
     axes: Basis,
     /// Least and greatest coordinates of its corners along the axes.
     corners: [Vec2; 2],
+    /// Around it.
+    ball: Ball,
     /// Whether front and back reflect.
     sides: [bool; 2],
     area: f32,
@@ -65,9 +76,7 @@ impl Mirrors {
     /// Those of a world; none where no emitter would be drawn in them.
     pub(super) fn of(world: &World) -> Self {
         let World { scene, lights, .. } = world;
-        if !lights.near.iter().any(|near| !matches!(near, Near::Delta(_))) {
-            return Self::default();
-        }
+        let Some(lamps) = lamps(&scene.geometry, &lights.near) else { return Self::default() };
         let (low, high) = scene.geometry.bounds();
         let diagonal = low.distance(high);
         let of_object = |object: &Object| {
@@ -86,10 +95,11 @@ impl Mirrors {
             }
         });
         planes.truncate(MOST);
+        planes.iter_mut().for_each(|plane| plane.ball = plane.around());
         let of = |(i, plane): (usize, &Mirror)| plane.triangles.iter().map(|&t| (t, i as u8)).collect::<Vec<_>>();
         let mut triangles: Vec<_> = planes.iter().enumerate().flat_map(of).collect();
         triangles.sort_unstable();
-        Self { planes, triangles }
+        Self { planes, triangles, lamps }
     }
 
     /// How many there are.
@@ -128,6 +138,9 @@ impl Vertex<'_> {
     fn in_mirror(&self, mirror: &Mirror, from: &Receiver, choice: f32, v: Vec2) -> Option<Rgb> {
         let world = self.world;
         let behind = mirror.image(from)?;
+        if !mirror.may_show(&world.mirrors.lamps, &behind) {
+            return None;
+        }
         let light = world.lights.sample_near(&world.scene, &behind, choice, v, 1.0)?;
         if light.delta || light.weight == Rgb::ZERO || !mirror.is_passed(&behind, light.wi, light.distance) {
             return None;
@@ -153,6 +166,20 @@ impl Mirror {
         let above = self.n.dot(of.p) - self.height;
         let reflects = self.sides[usize::from(above < 0.0)] && above != 0.0;
         reflects.then(|| Receiver { p: of.p - 2.0 * above * self.n, n: self.reflected(of.n) })
+    }
+
+    /// Whether a straight way may lead from the image of a receiver through the mirror to something in a ball.
+    fn may_show(&self, lamps: &Ball, from: &Receiver) -> bool {
+        let [(mirror, a), (lamp, b)] = [&self.ball, lamps].map(|ball| ball.seen_from(from.p));
+        // The cosine of the sum of both cones' angles.
+        let widest = ((1.0 - a * a) * (1.0 - b * b)).sqrt() - a * b;
+        a * a + b * b >= 1.0 || mirror.dot(lamp) >= widest
+    }
+
+    fn around(&self) -> Ball {
+        let [low, high] = self.corners;
+        let at = (low + high) * 0.5;
+        Ball { centre: self.axes.s * at.x + self.axes.t * at.y + self.n * self.height, radius: low.distance(high) * 0.5 }
     }
 
     /// Whether much can be seen from the front (0), or from the back (1).
@@ -186,6 +213,30 @@ impl Mirror {
     }
 }
 
+impl Ball {
+    /// The unit direction to its centre, and the sine of the angle to its edge from there; 1 within it.
+    fn seen_from(&self, p: Vec3) -> (Vec3, f32) {
+        let to = self.centre - p;
+        let inverse = to.length_recip();
+        (to * inverse, (self.radius * inverse).min(1.0))
+    }
+}
+
+/// A ball around all emitters that have an extent; `None` where none has.
+fn lamps(geometry: &Geometry, near: &[Near]) -> Option<Ball> {
+    let corners = |near: &Near| match near {
+        Near::Triangle(triangle) => {
+            let [a, b, c] = geometry.corners(triangle.index);
+            vec![a, b, c, if triangle.parallelogram { a + c - b } else { a }]
+        }
+        Near::Round(round) => geometry.rounds[*round as usize].bounds().map(|p| p.as_vec3()).to_vec(),
+        Near::Delta(_) => Vec::new(),
+    };
+    let of = |(low, high): (Vec3, Vec3), p: Vec3| (low.min(p), high.max(p));
+    let (low, high) = near.iter().flat_map(corners).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), of);
+    low.cmple(high).all().then(|| Ball { centre: (low + high) * 0.5, radius: low.distance(high) * 0.5 })
+}
+
 fn in_plane(axes: &Basis, p: Vec3) -> Vec2 {
     Vec2::new(axes.s.dot(p), axes.t.dot(p))
 }
@@ -212,8 +263,9 @@ fn planes(geometry: &Geometry, object: &Object, sides: [bool; 2], thin: f32) -> 
             if planes.len() == PLANES {
                 continue;
             }
-            let corners = [Vec2::INFINITY, Vec2::NEG_INFINITY];
-            planes.push(Mirror { n, height, axes: Basis::from_normal(n), corners, sides, area: 0.0, triangles: Vec::new() });
+            let (axes, corners) = (Basis::from_normal(n), [Vec2::INFINITY, Vec2::NEG_INFINITY]);
+            let (ball, triangles) = (Ball::default(), Vec::new());
+            planes.push(Mirror { n, height, axes, corners, ball, sides, area: 0.0, triangles });
         }
         let plane = &mut planes[found];
         plane.triangles.push(triangle);
