@@ -29,7 +29,7 @@ fn main() {
         std::fs::write(&path, xml).expect("a file");
         let world = World::new(load(&path, &LoadOptions::default()).expect("a scene"));
         let surface = world.intersect(&Ray::new(Vec3::new(0.1, 0.2, 1.0), Vec3::NEG_Z)).expect("a hit");
-        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = world.scene.bsdf(&surface);
         let numbers: Vec<[f32; 4]> = (0..SAMPLES).map(|i| Sampler::new(1, i).next_4d()).collect();
         let wi = |u: &[f32; 4]| Vec3::new(u[0] - 0.5, u[1] - 0.5, 0.6).normalize();
         let best = |f: &dyn Fn(&[f32; 4]) -> f32| {

@@ -139,7 +139,7 @@ fn materials_take_other_albedos_and_roughness() {
         let found = seen(&at, Vec3::new(1.0, 0.5, 0.0), Vec3::NEG_Y);
         assert!((found - albedo * FRAC_1_PI).abs().max_element() < 1e-6, "{frame}: {found}");
         let wall = at.intersect(&Ray::new(Vec3::Y, Vec3::NEG_Z)).unwrap();
-        assert_eq!(at.scene.materials[wall.material as usize].bsdf.alpha(&wall), Some(0.05));
+        assert_eq!(at.scene.bsdf(&wall).alpha(&wall), Some(0.05));
     }
 }
 

@@ -59,7 +59,7 @@ fn lobes_for_microfacets(f: &Folder, bounces: u32) -> Vec<Rgb> {
     let paths = PathParams { max_depth: bounces, rr_depth: u32::MAX };
     let fine = view.shade([7, 0], |p, stream| {
         let Some(alpha) = p.alpha else { return Rgb::ZERO };
-        let (frame, bsdf) = (p.surface.frame, &world.scene.materials[p.surface.material as usize].bsdf);
+        let (frame, bsdf) = (p.surface.frame, world.scene.bsdf(&p.surface));
         let (wi, mirrored) = (frame.to_local(p.wo), reflect(p.wo, p.normal));
         let albedo = bsdf.glossy_albedo(&p.surface, wi, glossy);
         let ray = |k| {

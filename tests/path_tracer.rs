@@ -180,7 +180,7 @@ fn emitter_samples_bsdf_samples_and_both_agree() {
         let ray = Ray::new(Vec3::new(0.5, 1.0, 0.5), Vec3::new(-0.5, -1.0, -0.5).normalize());
         let surface = world.intersect(&ray).unwrap();
         let wi = surface.frame.to_local(-ray.d);
-        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = world.scene.bsdf(&surface);
         let seed = 10 * i as u32;
         let both = estimate(16384, seed, |s| scattered(&world, &surface, -ray.d, Query::default(), None, &ONE_BOUNCE, s));
         let emitters = estimate(65536, seed + 1, |s| {
@@ -219,7 +219,7 @@ fn the_light_map_quantity_times_the_views_factor_is_the_diffuse_layer() {
         let (ray, params) = (slanted_ray(), PathParams::default());
         let surface = world.intersect(&ray).unwrap();
         let wi = surface.frame.to_local(-ray.d);
-        let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(&surface, wi);
+        let out = world.scene.bsdf(&surface).diffuse_out(&surface, wi);
         let stored = estimate(16384, 7, |s| transmitted_irradiance(&world, &surface, false, None, &params, s) * out * FRAC_1_PI);
         let query = Query { lobes: Lobes::DIFFUSE, ..Query::default() };
         let layer = estimate(16384, 8, |s| scattered(&world, &surface, -ray.d, query, None, &params, s));

@@ -521,7 +521,7 @@ fn real_scenes_are_what_mitsuba_sees() {
         let camera = world.scene.sensor.as_ref().unwrap();
         for (pixel, p, n, uv, reflectance) in seen {
             let s = world.intersect(&camera.ray(Vec2::from_array(pixel), Vec2::splat(0.5))).unwrap();
-            let found = albedo(&world.scene.materials[s.material as usize].bsdf, s.uv);
+            let found = albedo(world.scene.bsdf(&s), s.uv);
             assert!((s.p - Vec3::from_array(p)).length() < 2e-4, "{name} {pixel:?}: p {}", s.p);
             assert!((s.frame.n - Vec3::from_array(n)).length() < 1e-3, "{name} {pixel:?}: n {}", s.frame.n);
             assert!((s.uv - Vec2::from_array(uv)).length() < 1e-3, "{name} {pixel:?}: uv {}", s.uv);

@@ -102,7 +102,7 @@ impl LightMap {
     /// L(S|D)*DE: what the diffuse lobe at `surface` sends towards `wo` (unit, world, away from it).
     pub fn diffuse_radiance(&self, scene: &Scene, surface: &Surface, wo: Vec3) -> Rgb {
         let wi = surface.frame.to_local(wo);
-        let out = scene.materials[surface.material as usize].bsdf.diffuse_out(surface, wi);
+        let out = scene.bsdf(surface).diffuse_out(surface, wi);
         if out == Rgb::ZERO {
             return Rgb::ZERO;
         }

@@ -15,7 +15,8 @@ pub mod spline;
 pub mod summary;
 pub mod units;
 
-use crate::material::Material;
+use crate::material::bsdf::Bsdf;
+use crate::material::{Material, Surface};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -60,5 +61,11 @@ impl Scene {
     /// The triangles, to be changed: copied first where another scene has them too.
     pub fn geometry_mut(&mut self) -> &mut Geometry {
         Arc::make_mut(&mut self.geometry)
+    }
+
+    /// How a surface of this scene scatters light.
+    #[inline]
+    pub fn bsdf(&self, surface: &Surface) -> &Bsdf {
+        &self.materials[surface.material as usize].bsdf
     }
 }

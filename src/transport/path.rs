@@ -91,7 +91,7 @@ pub fn trace_layers(world: &World, ray: &Ray, params: &PathParams, sampler: &mut
         return Layers { emission: keep_finite(world.backdrop(ray.d)), ..Layers::default() };
     };
     let wo = -ray.d;
-    let present = world.scene.materials[surface.material as usize].bsdf.lobes();
+    let present = world.scene.bsdf(&surface).lobes();
     let layer = |lobes: Lobes, branch| {
         if !present.intersects(lobes) {
             return Rgb::ZERO;
@@ -161,7 +161,7 @@ pub fn radiance(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sam
 fn past_emitters(world: &World, mut surface: Surface, mut wo: Vec3, params: &PathParams, sampler: &mut Sampler) -> Rgb {
     let (mut sum, mut throughput) = (Rgb::ZERO, Rgb::ONE);
     for depth in 0..params.max_depth {
-        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = world.scene.bsdf(&surface);
         if !matches!(bsdf, Bsdf::ThinDielectric(_)) {
             let rest = PathParams { max_depth: params.max_depth - depth, ..*params };
             return sum + throughput * scattered(world, &surface, wo, Query::default(), None, &rest, sampler);
@@ -278,7 +278,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
         if let Some(known) = known {
             sum += throughput * known(&surface, wo);
             query.lobes = Lobes::NON_DIFFUSE;
-            if !world.scene.materials[surface.material as usize].bsdf.lobes().intersects(query.lobes) {
+            if !world.scene.bsdf(&surface).lobes().intersects(query.lobes) {
                 return sum;
             }
         }
@@ -315,19 +315,19 @@ pub(super) fn survival(throughput: Rgb, eta: f32) -> f32 {
 /// Where a surface that scatters light to `wo` sees emitters from: on the viewer's side, or on both where light passes through it.
 pub(super) fn receiver(world: &World, surface: &Surface, wo: Vec3) -> Receiver {
     let n = surface.frame.n;
-    let both = world.scene.materials[surface.material as usize].bsdf.is_transmissive();
+    let both = world.scene.bsdf(surface).is_transmissive();
     Receiver { p: surface.p, n: n * if both { 0.0 } else { 1f32.copysign(n.dot(wo)) } }
 }
 
 impl<'a> Vertex<'a> {
     /// Where light is scattered to `wo` (unit, world, away from the surface).
     pub(super) fn scattering(world: &'a World, surface: &'a Surface, wo: Vec3, query: Query) -> Self {
-        let at = world.scene.materials[surface.material as usize].bsdf.at(surface, surface.frame.to_local(wo), query);
+        let at = world.scene.bsdf(surface).at(surface, surface.frame.to_local(wo), query);
         Self { world, surface, measure: Measure::Scattering(at) }
     }
 
     fn bsdf(&self) -> &Bsdf {
-        &self.world.scene.materials[self.surface.material as usize].bsdf
+        self.world.scene.bsdf(self.surface)
     }
 
     /// Next-event estimation: what light straight from an emitter comes to, weighted against finding it by [`Vertex::sample`].

@@ -120,7 +120,7 @@ impl World {
     /// Tells the caches what the scattering model at a surface will read.
     #[inline]
     pub fn prefetch(&self, surface: &Surface) {
-        self.scene.materials[surface.material as usize].bsdf.prefetch(surface);
+        self.scene.bsdf(surface).prefetch(surface);
     }
 
     /// The surface that a camera's ray shows: where the scene hides its emitters, the first that is none.

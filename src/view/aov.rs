@@ -45,7 +45,7 @@ fn first_hit(world: &World, camera: &Camera, pixel: Vec2) -> FirstHit {
         let nothing = Vec3::ZERO;
         return FirstHit { depth: 0.0, normal: nothing, position: nothing, material: NO_MATERIAL, albedo: nothing, alpha: -1.0 };
     };
-    let bsdf = &world.scene.materials[s.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(&s);
     let wo = s.frame.to_local(-ray.d);
     FirstHit {
         depth: s.t,

@@ -131,7 +131,7 @@ pub fn guides(world: &World, camera: &Camera, mirror_alpha: f32, samples: u32, s
 }
 
 fn surface_guides(world: &World, s: &Surface, wo: Vec3, mirror_alpha: f32) -> [Guide; 2] {
-    let bsdf = &world.scene.materials[s.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(s);
     let wi = s.frame.to_local(wo);
     let (normal, depth) = (s.facing_normal(wo), s.t);
     let diffuse = bsdf.diffuse_albedo(s, wi);
@@ -144,7 +144,7 @@ fn surface_guides(world: &World, s: &Surface, wo: Vec3, mirror_alpha: f32) -> [G
     let ray = s.spawn(mirror_direction(s, wo));
     let through = match world.intersect(&ray) {
         Some(hit) => {
-            let there = world.scene.materials[hit.material as usize].bsdf.diffuse_albedo(&hit, hit.frame.to_local(-ray.d));
+            let there = world.scene.bsdf(&hit).diffuse_albedo(&hit, hit.frame.to_local(-ray.d));
             let all = there + glossy_albedo(world, &hit, -ray.d);
             Guide { normal: hit.facing_normal(-ray.d), depth: depth + hit.t, albedo: all * lobe, factor: lobe * all }
         }

@@ -132,13 +132,13 @@ fn pixel(world: &World, curvature: &CurvatureMap, surface: Surface, wo: Vec3) ->
 
 /// Microfacet alpha of the lobe that a view of `surface` from `wo` asks the probes for; `None` where it has none.
 pub fn view_alpha(world: &World, surface: &Surface, wo: Vec3) -> Option<f32> {
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(surface);
     if is_glossy(world, surface, wo) { bsdf.alpha(surface) } else { None }
 }
 
 /// Whether a view of `surface` from `wo` has a lobe for a probe to store.
 pub fn is_glossy(world: &World, surface: &Surface, wo: Vec3) -> bool {
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(surface);
     bsdf.lobes().contains(Lobes::NON_DIFFUSE) && (bsdf.is_two_sided() || surface.frame.n.dot(wo) > 0.0)
 }
 

@@ -53,7 +53,7 @@ pub fn mirror_chain(world: &World, lightmap: &LightMap, surface: &Surface, wo: V
         if bounce == 0 {
             shown.first = Some(hit);
         }
-        let alpha = world.scene.materials[hit.material as usize].bsdf.alpha(&hit);
+        let alpha = world.scene.bsdf(&hit).alpha(&hit);
         if !(is_glossy(world, &hit, wo) && alpha.is_some_and(|alpha| alpha <= params.max_alpha)) {
             break;
         }
@@ -96,6 +96,6 @@ pub fn add_mirrored(rest: &[Rgb], mut mirrored: Vec<Rgb>) -> Vec<Rgb> {
 
 /// Directional albedo of a surface's non-diffuse lobes towards `wo` (unit, world, away from it), at its own roughness.
 pub(crate) fn glossy_albedo(world: &World, surface: &Surface, wo: Vec3) -> Rgb {
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(surface);
     bsdf.glossy_albedo(surface, surface.frame.to_local(wo), GLOSSY)
 }

@@ -145,7 +145,7 @@ fn polygons_of_a_million_corners_take_linear_time() {
 /// Reflectance where a ray down -z at (x, y) meets the scene.
 fn seen(world: &World, x: f32, y: f32) -> Vec3 {
     let s = world.intersect(&reprobe::base::ray::Ray::new(Vec3::new(x, y, 5.0), Vec3::NEG_Z)).unwrap();
-    match &world.scene.materials[s.material as usize].bsdf {
+    match world.scene.bsdf(&s) {
         Bsdf::Diffuse(d) => d.reflectance.at(&s),
         other => panic!("{other:?}"),
     }

@@ -218,7 +218,7 @@ fn mirrored(bake: &Bake, probe: &Probe, centre: &Centre) -> Option<Rgb> {
     let map = bake.lightmap.filter(|_| bake.tells_mirrored())?;
     let wo = -direction(&probe.map, centre.texel, Vec2::splat(0.5));
     let surface = bake.world.surface(&centre.hit);
-    let alpha = bake.world.scene.materials[surface.material as usize].bsdf.alpha(&surface)?;
+    let alpha = bake.world.scene.bsdf(&surface).alpha(&surface)?;
     (alpha == 0.0).then(|| mirror_light(bake.world, map, &surface, wo).1)
 }
 

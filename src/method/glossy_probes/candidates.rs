@@ -152,7 +152,7 @@ fn reflector(world: &World, texel: &Texel, eye: Vec3, roughness_scale: Option<f3
 fn lobe(world: &World, texel: &Texel, eye: Vec3, roughness_scale: Option<f32>) -> (f32, Rgb) {
     let b = texel.barycentric();
     let surface = world.surface(&Hit { t: 0.0, triangle: texel.triangle, u: b.x, v: b.y });
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(&surface);
     let wo = (eye - surface.p).try_normalize().unwrap_or(surface.frame.n);
     let query = |roughness_scale| Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
     let albedo = roughness_scale.map(|scale| bsdf.glossy_albedo(&surface, surface.frame.to_local(wo), query(scale)));

@@ -64,7 +64,7 @@ struct Lobe {
 impl Lobe {
     fn new(world: &World, probe: &Probe, texel: u32, surface: &Surface, roughness_scale: f32) -> Self {
         let axis = reflect((probe.position - surface.p).normalize_or_zero(), surface.frame.n);
-        let alpha = world.scene.materials[surface.material as usize].bsdf.alpha(surface).unwrap_or(0.0) * roughness_scale;
+        let alpha = world.scene.bsdf(surface).alpha(surface).unwrap_or(0.0) * roughness_scale;
         let distance = probe.texels[texel as usize].reflected().distance_from(surface.p);
         Self { p: surface.p, axis, distance, alpha }
     }

@@ -94,6 +94,6 @@ pub fn footprint_texels(probe: &Probe, at: Vec2) -> [usize; 4] {
 /// Directional albedo of the non-diffuse lobe in the view.
 fn view_albedo(world: &World, pixel: &Pixel, roughness_scale: f32) -> Rgb {
     let query = Query { lobes: Lobes::NON_DIFFUSE, roughness_scale };
-    let bsdf = &world.scene.materials[pixel.surface.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(&pixel.surface);
     bsdf.glossy_albedo(&pixel.surface, pixel.surface.frame.to_local(pixel.wo), query)
 }

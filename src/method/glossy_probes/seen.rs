@@ -63,7 +63,7 @@ fn see(world: &World, ray: &Ray, hit: &Hit) -> Seen {
     let s = world.surface(hit);
     let ng = if s.ng.dot(ray.d) > 0.0 { -s.ng } else { s.ng };
     let normal = if s.frame.n.dot(ng) < 0.0 { -s.frame.n } else { s.frame.n };
-    let bsdf = &world.scene.materials[s.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(&s);
     // One-sided models are black from behind.
     let lit = bsdf.is_two_sided() || s.frame.n.dot(ray.d) < 0.0;
     let alpha = if lit && bsdf.lobes().contains(Lobes::NON_DIFFUSE) { bsdf.alpha(&s) } else { None };

@@ -82,7 +82,7 @@ pub fn look(world: &World, position: Vec3, index: u32, params: &LightFieldBakePa
         let stream = hash_words(&[seed, index, i as u32]);
         let light = |s| scattered(world, &surface, -d, Query::default(), None, &path, &mut Sampler::new(stream, s));
         let direct = (0..params.spp).map(light).sum::<Rgb>() / params.spp as f32;
-        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = world.scene.bsdf(&surface);
         let albedo = bsdf.diffuse_albedo(&surface, surface.frame.to_local(-d));
         let towards = |n: Vec3| if n.dot(d) > 0.0 { -n } else { n };
         (surface.t, towards(surface.ng), direct, albedo, towards(surface.frame.n))

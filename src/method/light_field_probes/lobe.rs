@@ -15,7 +15,7 @@ use std::f32::consts::PI;
 /// A ray along a glossy lobe of a surface that is seen from `wo`, no longer than `far` metres, and how it was drawn.
 pub fn lobe_ray(world: &World, (surface, wo): (&Surface, Vec3), far: f32, sampler: &mut Sampler) -> Option<(Ray, BsdfSample)> {
     let [x, y, lobe, _] = sampler.next_4d();
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(surface);
     let sample = bsdf.sample(surface, surface.frame.to_local(wo), lobe, Vec2::new(x, y), GLOSSY)?;
     Some((Ray { t_max: far, ..surface.spawn(surface.frame.to_world(sample.wo)) }, sample))
 }

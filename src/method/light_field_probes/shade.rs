@@ -40,7 +40,7 @@ impl Shading<'_> {
     pub fn diffuse(&self, view: &GBuffer) -> Vec<Rgb> {
         view.shade([self.seed, self.frame], |p, stream| {
             let surface = &p.surface;
-            let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+            let bsdf = self.world.scene.bsdf(surface);
             let albedo = bsdf.diffuse_albedo(surface, surface.frame.to_local(p.wo));
             if albedo == Rgb::ZERO {
                 return Rgb::ZERO;

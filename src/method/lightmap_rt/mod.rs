@@ -98,7 +98,7 @@ fn light_along(world: &World, lightmap: &LightMap, pixel: &Pixel, params: &Light
     let (mut sum, mut throughput) = (Rgb::ZERO, Rgb::ONE);
     for _ in 1..params.path().max_depth {
         let [x, y, lobe, _] = sampler.next_4d();
-        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = world.scene.bsdf(&surface);
         let Some(sample) = bsdf.sample(&surface, surface.frame.to_local(wo), lobe, Vec2::new(x, y), GLOSSY) else { break };
         throughput *= sample.weight;
         let ray = surface.spawn(surface.frame.to_world(sample.wo));

@@ -69,7 +69,7 @@ impl<'w> Site<'w> {
     /// Of a light's place, which stands for `area`.
     pub fn new(world: &'w World, place: &Place, area: f32, params: &ManyLightParams) -> Self {
         let (surface, side) = (place.surface(world), place.side());
-        let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = world.scene.bsdf(&surface);
         let out = |k: u32| {
             let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / VIEWS as f32, (0.618 * k as f32 + 0.3).fract()));
             bsdf.diffuse_out(&surface, Vec3::new(d.x, d.y, d.z * side))

@@ -67,7 +67,7 @@ impl Shading<'_> {
             return Some((mirror_direction(surface, wo), glossy_albedo(self.world, surface, wo)));
         }
         let [x, y, lobe, _] = sampler.next_4d();
-        let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = self.world.scene.bsdf(surface);
         let sample = bsdf.sample(surface, surface.frame.to_local(wo), lobe, Vec2::new(x, y), GLOSSY)?;
         Some((surface.frame.to_world(sample.wo), sample.weight))
     }

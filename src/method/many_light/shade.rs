@@ -69,7 +69,7 @@ impl Shading<'_> {
 
     /// The same at a surface that is seen from the unit direction `wo`, of whose glossy lobe the alpha is given, if light is gathered for it.
     pub fn gathered(&self, surface: &Surface, wo: Vec3, alpha: Option<f32>, stream: u32) -> (Light, u32) {
-        let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = self.world.scene.bsdf(surface);
         let side = 1f32.copysign(surface.frame.to_local(wo).z);
         let n = surface.frame.n * side;
         let takes_diffuse = bsdf.lobes().contains(Lobes::DIFFUSE);
@@ -115,7 +115,7 @@ impl Shading<'_> {
 
     /// What a surface sends to `wo` of what enters its diffuse lobe.
     pub fn diffuse_out(&self, surface: &Surface, wo: Vec3) -> Rgb {
-        let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = self.world.scene.bsdf(surface);
         bsdf.diffuse_out(surface, surface.frame.to_local(wo)) * FRAC_1_PI
     }
 }

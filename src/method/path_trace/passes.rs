@@ -169,7 +169,7 @@ pub(super) fn layers(walk: &mut Walk, ray: &Ray, weights: &[Rgb; 3], sampler: &m
     let mut branches = [0, 1].map(|k| sampler.branch(k));
     let numbers = branches.each_mut().map(|branch| walk.numbers(branch));
     let Some(surface) = world.seen(ray) else { return ([world.backdrop(ray.d), Rgb::ZERO, Rgb::ZERO], RAY_COST) };
-    let present = world.scene.materials[surface.material as usize].bsdf.lobes();
+    let present = world.scene.bsdf(&surface).lobes();
     let mut layers = [world.lights.emitted(&world.scene, &surface, -ray.d), Rgb::ZERO, Rgb::ZERO];
     let mut cost = RAY_COST;
     for (k, lobes) in [Lobes::DIFFUSE, Lobes::NON_DIFFUSE].into_iter().enumerate() {

@@ -57,7 +57,7 @@ fn reflectance(world: &World, r: &Receiver) -> Rgb {
         let at = r.surface(world, k);
         let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / POINTS as f32, (0.618 * k as f32 + 0.3).fract()));
         let d = Vec3::new(d.x, d.y, d.z * side);
-        let bsdf = &world.scene.materials[at.material as usize].bsdf;
+        let bsdf = world.scene.bsdf(&at);
         diffuse += bsdf.diffuse_out(&at, d);
         others += bsdf.glossy_albedo(&at, d, GLOSSY);
         entering += bsdf.diffuse_in(&at, d);
@@ -197,7 +197,7 @@ impl Blocker {
     fn all(world: &World, surfaces: &[(Surface, Vec3)], volume: Option<&Volume>, seed: u32) -> Vec<Self> {
         let of = |(i, (surface, wo)): (usize, &(Surface, Vec3))| {
             let wi = surface.frame.to_local(*wo);
-            let out = world.scene.materials[surface.material as usize].bsdf.diffuse_out(surface, wi) * FRAC_1_PI;
+            let out = world.scene.bsdf(surface).diffuse_out(surface, wi) * FRAC_1_PI;
             let mut sampler = Sampler::new(hash_words(&[seed, i as u32, BLOCKER]), 0);
             let direct = transmitted_irradiance(world, surface, wi.z < 0.0, None, &PathParams::DIRECT, &mut sampler);
             Self { out, direct, taps: volume.map_or_else(Vec::new, |v| v.taps(world, surface, *wo)) }

@@ -45,7 +45,7 @@ fn norm(
     let x = r.surface(world, 0);
     let normal = facing(&x, r.back);
     let frame = Basis::from_normal(x.frame.n * if r.back { -1.0 } else { 1.0 });
-    let bsdf = &world.scene.materials[x.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(&x);
     let mut y = [0.0; MAX_TERMS];
     // The irradiance of each harmonic, with the directions that the operator was made with.
     let mut own = [0.0; MAX_TERMS];

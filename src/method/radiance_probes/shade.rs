@@ -119,7 +119,7 @@ impl Shading<'_> {
     /// What the diffuse lobe of a shape that the frame adds sends on of light by way of the probes.
     fn of_added(&self, surface: &Surface, wo: Vec3) -> Rgb {
         let Some((volume, light)) = self.volume else { return Rgb::ZERO };
-        let bsdf = &self.world.scene.materials[surface.material as usize].bsdf;
+        let bsdf = self.world.scene.bsdf(surface);
         match bsdf.diffuse_out(surface, surface.frame.to_local(wo)) {
             Rgb::ZERO => Rgb::ZERO,
             out => out * irradiance(&volume.taps(self.world, surface, wo), light) * FRAC_1_PI,
@@ -129,7 +129,7 @@ impl Shading<'_> {
     /// Diffuse reflection of light of first order. *Ours*: by directions in place of the two factors of Ramamoorthi and Hanrahan 2001, so that
     /// coats, bump and normal maps have their part.
     fn taken_in(&self, p: &Pixel, light: &[Rgb; 4]) -> Rgb {
-        let bsdf = &self.world.scene.materials[p.surface.material as usize].bsdf;
+        let bsdf = self.world.scene.bsdf(&p.surface);
         let out = bsdf.diffuse_out(&p.surface, p.surface.frame.to_local(p.wo));
         if out == Rgb::ZERO {
             return Rgb::ZERO;
@@ -150,7 +150,7 @@ impl Shading<'_> {
         // A distant light of irradiance c has the terms c Y_j(d): c by least squares over the linear ones.
         let [_, y1 @ ..] = first_four(d);
         let irradiance = light[1..].iter().zip(y1).map(|(&l, y)| l * y).sum::<Rgb>() / (0.75 * FRAC_1_PI);
-        let bsdf = &self.world.scene.materials[p.surface.material as usize].bsdf;
+        let bsdf = self.world.scene.bsdf(&p.surface);
         let local = |w: Vec3| p.surface.frame.to_local(w);
         let (value, _) = bsdf.eval_pdf(&p.surface, local(p.wo), local(d), GLOSSY);
         value * irradiance.max(Rgb::ZERO)

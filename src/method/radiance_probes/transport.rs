@@ -80,7 +80,7 @@ impl Gather {
     pub fn row(&self, ground: &Ground, receiver: u32) -> Row {
         let surfaces = std::array::from_fn::<_, POINTS, _>(|k| ground.receivers.surface(ground.world, receiver, k));
         let back = ground.receivers.list[receiver as usize].back;
-        let bsdf = &ground.world.scene.materials[surfaces[0].material as usize].bsdf;
+        let bsdf = ground.world.scene.bsdf(&surfaces[0]);
         let frames = surfaces.map(|s| Basis::from_normal(s.frame.n * if back { -1.0 } else { 1.0 }));
         let share = 1.0 / self.directions.len() as f32;
         let rays = self.directions.iter().enumerate().filter_map(|(k, &local)| {

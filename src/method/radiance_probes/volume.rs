@@ -179,7 +179,7 @@ impl Volume {
 
 /// T_in of light from all directions.
 fn entering(world: &World, surface: &Surface, side: f32) -> f32 {
-    let bsdf = &world.scene.materials[surface.material as usize].bsdf;
+    let bsdf = world.scene.bsdf(surface);
     let of = |k: u32| {
         let d = cosine_hemisphere(Vec2::new((k as f32 + 0.5) / DIRECTIONS as f32, (0.618_034 * (k as f32 + 0.5)).fract()));
         bsdf.diffuse_in(surface, Vec3::new(d.x, d.y, d.z * side))

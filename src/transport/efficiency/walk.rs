@@ -100,7 +100,7 @@ impl Walk<'_> {
     ) -> Estimate {
         self.world.lights.prefetch_radiance(emitter[2], Vec2::new(emitter[0], emitter[1]));
         self.world.prefetch(s);
-        let lobes = self.world.scene.materials[s.material as usize].bsdf.lobes();
+        let lobes = self.world.scene.bsdf(s).lobes();
         let reached = Reached { s, query, start, direction: lobes.intersects(Lobes::NON_DIFFUSE).then_some(wo) };
         let [direct, onward] = self.counts(&reached);
         let [emitters, rays] = [(direct + emitter[3]) as u32, (onward + direction[3]) as u32];
