@@ -7,14 +7,13 @@
 
 use super::light_tree::Receiver;
 use super::lights::Near;
-use super::met::{Found, power_heuristic};
-use super::path::Vertex;
+use super::met::Found;
 use super::{Sampler, World};
-use crate::base::math::{Basis, Rgb};
+use crate::base::math::Basis;
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
+use crate::material::bsdf::Bsdf;
 use crate::material::bsdf::warp::cosine_hemisphere;
-use crate::material::bsdf::{Bsdf, Query};
 use crate::scene::normals::unit_normal;
 use crate::scene::{Geometry, Object};
 use glam::{Vec2, Vec3};
@@ -56,7 +55,7 @@ struct Ball {
 
 /// A part of a plane that reflects.
 #[derive(Debug)]
-struct Mirror {
+pub(super) struct Mirror {
     /// Unit, on the front.
     n: Vec3,
     /// n · x of the plane's points.
@@ -107,7 +106,20 @@ impl Mirrors {
         self.planes.len()
     }
 
-    /// The mirror that a triangle belongs to.
+    /// The mirrors that may show a lamp to a receiver, each with the receiver's image behind it.
+    #[inline]
+    pub(super) fn before(&self, receiver: &Receiver) -> impl Iterator<Item = (&Mirror, Receiver)> {
+        self.planes.iter().filter_map(|mirror| {
+            let behind = mirror.image(receiver)?;
+            mirror.may_show(&self.lamps, &behind).then_some((mirror, behind))
+        })
+    }
+
+    /// Whether a triangle is a part of a mirror.
+    pub(super) fn has(&self, mirror: &Mirror, triangle: u32) -> bool {
+        self.of_triangle(triangle).is_some_and(|found| std::ptr::eq(found, mirror))
+    }
+
     fn of_triangle(&self, triangle: u32) -> Option<&Mirror> {
         let found = self.triangles.binary_search_by_key(&triangle, |t| t.0).ok()?;
         self.planes.get(self.triangles[found].1 as usize)
@@ -121,42 +133,6 @@ impl Mirrors {
             return None;
         }
         Some((self.of_triangle(s.triangle)?.image(from)?, Found { mirrored: true, ..found }))
-    }
-}
-
-impl Vertex<'_> {
-    /// Next-event estimation by way of every mirror, by the numbers that [`Vertex::direct`]'s sample was drawn by.
-    #[inline]
-    pub(super) fn in_mirrors(&self, from: &Receiver, choice: f32, v: Vec2) -> Rgb {
-        let mut sum = Rgb::ZERO;
-        for mirror in &self.world.mirrors.planes {
-            sum += self.in_mirror(mirror, from, choice, v).unwrap_or(Rgb::ZERO);
-        }
-        sum
-    }
-
-    fn in_mirror(&self, mirror: &Mirror, from: &Receiver, choice: f32, v: Vec2) -> Option<Rgb> {
-        let world = self.world;
-        let behind = mirror.image(from)?;
-        if !mirror.may_show(&world.mirrors.lamps, &behind) {
-            return None;
-        }
-        let light = world.lights.sample_near(&world.scene, &behind, choice, v, 1.0)?;
-        if light.delta || light.weight == Rgb::ZERO || !mirror.is_passed(&behind, light.wi, light.distance) {
-            return None;
-        }
-        let wi = mirror.reflected(light.wi);
-        let (value, pdf) = self.eval_pdf(self.surface.frame.to_local(wi));
-        if value == Rgb::ZERO {
-            return None;
-        }
-        let surface = world.intersect(&self.surface.spawn(wi))?;
-        if !std::ptr::eq(mirror, world.mirrors.of_triangle(surface.triangle)?) {
-            return None;
-        }
-        let reflection = Vertex::scattering(world, &surface, -wi, Query::default()).sample(0.5, Vec2::splat(0.5))?;
-        let seen = !world.occluded(&light.shadow_ray(&surface));
-        seen.then(|| light.weight * value * reflection.weight * power_heuristic(light.pdf, pdf))
     }
 }
 
@@ -198,12 +174,12 @@ impl Mirror {
     }
 
     /// A direction as the mirror shows it.
-    fn reflected(&self, d: Vec3) -> Vec3 {
+    pub(super) fn reflected(&self, d: Vec3) -> Vec3 {
         d - 2.0 * self.n.dot(d) * self.n
     }
 
     /// Whether the way from an image behind the mirror, in a unit direction and so far, may lead through it.
-    fn is_passed(&self, from: &Receiver, d: Vec3, distance: f32) -> bool {
+    pub(super) fn is_passed(&self, from: &Receiver, d: Vec3, distance: f32) -> bool {
         let t = (self.height - self.n.dot(from.p)) / self.n.dot(d);
         if !(t > 0.0 && t < distance) {
             return false;

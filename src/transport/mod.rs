@@ -18,6 +18,7 @@ mod round_light;
 pub mod sampler;
 mod steps;
 mod sun;
+mod vertex;
 pub mod world;
 
 pub use sampler::Sampler;

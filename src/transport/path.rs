@@ -1,23 +1,22 @@
 //! The path tracer, with the split of the first vertex into its diffuse and non-diffuse lobes.
 //!
 //! At each vertex one emitter sample and one BSDF sample, combined by the power heuristic (Veach 1997, §9.2), as Mitsuba's
-//! `path`. *Ours*: the two halves of the first vertex are two paths of their own that share the camera ray, so one pass gives all
+//! `path`; *ours*: one more emitter sample in each large plane mirror ([`super::mirrors`]). *Ours*, too: the two halves of the first vertex are two paths of their own that share the camera ray, so one pass gives all
 //! layers, each with the noise of a render of that layer alone; and the roulette's throughput leaves the first vertex's
 //! weight out, so that a weak lobe's layer is as well sampled as a strong one's.
 
-use super::light_sample::LightSample;
 use super::light_tree::Receiver;
-use super::met::{Found, emission_met, environment_met, power_heuristic};
+use super::met::{Found, emission_met, environment_met};
+use super::vertex::{Vertex, receiver};
 use super::{Sampler, World};
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::material::Surface;
 use crate::material::bsdf::warp::cosine_hemisphere;
-use crate::material::bsdf::{At, Bsdf, BsdfSample, Lobes, Query};
+use crate::material::bsdf::{Bsdf, Lobes, Query};
 use crate::scene::Scene;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Largest probability with which the roulette lets a path live.
@@ -133,7 +132,7 @@ pub fn transmitted_irradiance(
 ) -> Rgb {
     let side = if back { -1.0 } else { 1.0 };
     let from = Receiver { p: surface.p, n: surface.frame.n * side };
-    integrate(&Vertex { world, surface, measure: Measure::Irradiance { side } }, from, known, params, sampler)
+    integrate(&Vertex::irradiance(world, surface, side), from, known, params, sampler)
 }
 
 /// Ambient occlusion: one sample of ∫ V(ω) cos θ / π dω over the hemisphere of `frame.n`, or of its back, where V is 1 if nothing is met
@@ -198,21 +197,6 @@ pub(super) fn keep_finite(c: Rgb) -> Rgb {
         DROPPED.fetch_add(1, Ordering::Relaxed);
     }
     Rgb::ZERO
-}
-
-/// What incident radiance is integrated against at a vertex.
-enum Measure<'a> {
-    /// BSDF times cosine.
-    Scattering(At<'a>),
-    /// Transmission into the diffuse layer times cosine, on the side of the frame's normal (1) or behind it (-1).
-    Irradiance { side: f32 },
-}
-
-/// A point of a path where light arrives.
-pub(super) struct Vertex<'a> {
-    pub(super) world: &'a World,
-    pub(super) surface: &'a Surface,
-    measure: Measure<'a>,
 }
 
 /// A ray of a path and how it was found.
@@ -310,61 +294,4 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
 /// The roulette's probability that a path goes on, by what has become of its radiance and the relative index of refraction.
 pub(super) fn survival(throughput: Rgb, eta: f32) -> f32 {
     (throughput.max_element() * eta * eta * ROULETTE_MERCY).min(ROULETTE_CAP)
-}
-
-/// Where a surface that scatters light to `wo` sees emitters from: on the viewer's side, or on both where light passes through it.
-pub(super) fn receiver(world: &World, surface: &Surface, wo: Vec3) -> Receiver {
-    let n = surface.frame.n;
-    let both = world.scene.bsdf(surface).is_transmissive();
-    Receiver { p: surface.p, n: n * if both { 0.0 } else { 1f32.copysign(n.dot(wo)) } }
-}
-
-impl<'a> Vertex<'a> {
-    /// Where light is scattered to `wo` (unit, world, away from the surface).
-    pub(super) fn scattering(world: &'a World, surface: &'a Surface, wo: Vec3, query: Query) -> Self {
-        let at = world.scene.bsdf(surface).at(surface, surface.frame.to_local(wo), query);
-        Self { world, surface, measure: Measure::Scattering(at) }
-    }
-
-    fn bsdf(&self) -> &Bsdf {
-        self.world.scene.bsdf(self.surface)
-    }
-
-    /// Next-event estimation: what light straight from an emitter comes to, weighted against finding it by [`Vertex::sample`].
-    pub(super) fn direct(&self, light: Option<LightSample>) -> Rgb {
-        let Some(light) = light else { return Rgb::ZERO };
-        let wo = self.surface.frame.to_local(light.wi);
-        let (value, pdf) = self.eval_pdf(wo);
-        if value == Rgb::ZERO || light.weight == Rgb::ZERO || self.world.occluded(&light.shadow_ray(self.surface)) {
-            return Rgb::ZERO;
-        }
-        light.weight * value * power_heuristic(light.pdf, if light.delta { 0.0 } else { pdf })
-    }
-
-    /// What radiance from the local direction `wo` is multiplied with, cosine included, and the density (solid angle) with
-    /// which [`Vertex::sample`] finds it.
-    pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
-        match &self.measure {
-            Measure::Scattering(at) => at.eval_pdf(wo),
-            &Measure::Irradiance { side } if wo.z * side > 0.0 => {
-                let cos = wo.z * side;
-                (Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * cos), cos * FRAC_1_PI)
-            }
-            Measure::Irradiance { .. } => (Rgb::ZERO, 0.0),
-        }
-    }
-
-    /// Draws a local direction; its weight is the value of [`Vertex::eval_pdf`] over the density.
-    pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
-        match &self.measure {
-            Measure::Scattering(at) => at.sample(u, v).filter(|s| s.weight != Rgb::ZERO),
-            &Measure::Irradiance { side } => {
-                let (sin_phi, cos_phi) = (v.x * TAU).sin_cos();
-                let (cos, sin) = ((1.0 - v.y).sqrt(), v.y.sqrt());
-                let wo = Vec3::new(sin * cos_phi, sin * sin_phi, cos * side);
-                let weight = Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * PI);
-                (cos > 0.0).then_some(BsdfSample { wo, weight, pdf: cos * FRAC_1_PI, delta: false, eta: 1.0 })
-            }
-        }
-    }
 }

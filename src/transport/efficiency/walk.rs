@@ -7,7 +7,8 @@ use crate::material::Surface;
 use crate::material::bsdf::{Lobes, Query};
 use crate::transport::light_tree::Receiver;
 use crate::transport::met::{Found, emission_met, environment_met};
-use crate::transport::path::{PathParams, Vertex, keep_finite, receiver, survival};
+use crate::transport::path::{PathParams, keep_finite, survival};
+use crate::transport::vertex::{Vertex, receiver};
 use crate::transport::{Sampler, World};
 use glam::{Vec2, Vec3};
 
