@@ -2,7 +2,8 @@
 //!
 //! *Ours*: a path finds a lamp in a mirror only where scattering happens to go there, so that a wall with a window's reflection on it is
 //! full of bright dots. An emitter is therefore drawn in each of a scene's few large mirrors, too: for where the receiver seems to be behind it, and
-//! weighted against scattering as any other emitter sample. Lamps without extent are left out, which no scattered ray can meet either:
+//! weighted against scattering as any other emitter sample, where paths go by [`super::efficiency`]; all others have twins on the GPU, which
+//! find such light by chance. Lamps without extent are left out, which no scattered ray can meet either:
 //! what is computed stays what it is.
 
 use super::light_tree::Receiver;
@@ -29,7 +30,7 @@ const LEAST: [f32; 2] = [1e-4, 0.1];
 const LOOKS: u32 = 64;
 const OPEN: f32 = 0.1;
 
-/// Planes of one object that are told apart; what curves has more.
+/// Planes of one object that are told apart (what curves has more), and of a scene that are looked at.
 const PLANES: usize = 64;
 
 /// Largest difference of unit normals in a plane, and of heights over it as a share of the scene's diagonal.
@@ -86,6 +87,7 @@ impl Mirrors {
         };
         let mut planes: Vec<Mirror> = scene.geometry.objects.iter().flat_map(of_object).collect();
         planes.sort_by(|a, b| b.area.total_cmp(&a.area));
+        planes.truncate(PLANES);
         let least = planes.first().map_or(0.0, |largest| (LEAST[0] * diagonal * diagonal).max(LEAST[1] * largest.area));
         planes.retain_mut(|plane| {
             plane.area >= least && {

@@ -1,7 +1,7 @@
 //! The path tracer, with the split of the first vertex into its diffuse and non-diffuse lobes.
 //!
 //! At each vertex one emitter sample and one BSDF sample, combined by the power heuristic (Veach 1997, §9.2), as Mitsuba's
-//! `path`; *ours*: one more emitter sample in each large plane mirror ([`super::mirrors`]). *Ours*, too: the two halves of the first vertex are two paths of their own that share the camera ray, so one pass gives all
+//! `path`. *Ours*: the two halves of the first vertex are two paths of their own that share the camera ray, so one pass gives all
 //! layers, each with the noise of a render of that layer alone; and the roulette's throughput leaves the first vertex's
 //! weight out, so that a weak lobe's layer is as well sampled as a strong one's.
 
@@ -220,9 +220,6 @@ fn integrate(vertex: &Vertex, from: Receiver, known: Option<KnownDiffuse>, param
     }
     let [[light_x, light_y, light_choice, _], [x, y, lobe, _]] = sampler.next_two_4d();
     let mut sum = vertex.direct(world.light(&from, light_choice, Vec2::new(light_x, light_y)));
-    if params.max_depth > 1 {
-        sum += vertex.in_mirrors(&from, light_choice, Vec2::new(light_x, light_y));
-    }
     // Direct light alone, and no ray could meet any.
     if params.max_depth == 1 && world.lights.never_met {
         return keep_finite(sum);
@@ -266,15 +263,11 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
                 return sum;
             }
         }
-        let behind = world.mirrors.behind(&surface, &from, found);
         from = receiver(world, &surface, wo);
         // Before the textures are read, which have been asked for only now.
         let light = world.light(&from, light_choice, Vec2::new(light_x, light_y));
         let vertex = Vertex::scattering(world, &surface, wo, query);
         sum += throughput * vertex.direct(light);
-        if params.max_depth - depth > 1 {
-            sum += throughput * vertex.in_mirrors(&from, light_choice, Vec2::new(light_x, light_y));
-        }
         let Some(sample) = vertex.sample(lobe, Vec2::new(x, y)) else { return sum };
         throughput *= sample.weight;
         eta *= sample.eta;
@@ -286,7 +279,7 @@ fn incident(world: &World, start: Start, known: Option<KnownDiffuse>, params: &P
             }
             throughput /= lives;
         }
-        (from, found) = behind.unwrap_or((from, Found::by(&sample)));
+        found = Found::by(&sample);
         ray = surface.spawn(surface.frame.to_world(sample.wo));
     }
 }
