@@ -105,6 +105,14 @@ impl Geometry {
         (b - a).cross(c - a)
     }
 
+    /// Shading normals at a triangle's corners, where `ng` is its unit geometric normal.
+    pub fn shading_normals(&self, triangle: u32, ng: Vec3) -> [Vec3; 3] {
+        if self.object(triangle).face_normals {
+            return [ng; 3];
+        }
+        self.triangles[triangle as usize].map(|i| self.normals[i as usize])
+    }
+
     /// Lower and upper corner of everything; (inf, -inf) for an empty scene.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         self.positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)))

@@ -51,7 +51,7 @@ impl Facet {
         let extent = corners.iter().fold(0f32, |m, p| m.max(p.abs().max_element()));
         Self {
             corners,
-            normals: if object.face_normals { [ng; 3] } else { vertices.map(|i| geometry.normals[i]) },
+            normals: geometry.shading_normals(triangle, ng),
             uvs: vertices.map(|i| geometry.uvs[i]),
             ng,
             object: object_index,

@@ -33,14 +33,10 @@ impl LightTriangle {
     }
 
     /// `mean` is the mean luminance of the emitter.
-    pub(super) fn bounds(&self, geometry: &Geometry, object: &Object, mean: f32) -> LightBounds {
+    pub(super) fn bounds(&self, geometry: &Geometry, mean: f32) -> LightBounds {
         let [a, b, c] = self.corners;
         let fourth = if self.parallelogram { a + c - b } else { a };
-        let normals = if object.face_normals {
-            [self.normal; 3]
-        } else {
-            geometry.triangles[self.index as usize].map(|i| geometry.normals[i as usize])
-        };
+        let normals = geometry.shading_normals(self.index, self.normal);
         let axis = normals.iter().sum::<Vec3>().try_normalize();
         let widest = axis.map_or(PI, |axis| normals.iter().map(|n| axis.angle_between(*n)).fold(0.0, f32::max));
         // Normals between them lie in the same cone as long as that is narrower than a hemisphere.

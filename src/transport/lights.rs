@@ -74,7 +74,7 @@ impl Lights {
                         let parallelogram = is_parallelogram(&scene.geometry, object);
                         for t in object.triangles.clone() {
                             let triangle = LightTriangle::new(&scene.geometry, t, i as u32, parallelogram);
-                            bounds.push(triangle.bounds(&scene.geometry, object, mean));
+                            bounds.push(triangle.bounds(&scene.geometry, mean));
                             this.near.push(Near::Triangle(triangle));
                         }
                         if parallelogram {

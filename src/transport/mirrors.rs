@@ -1,16 +1,16 @@
 //! Plane mirrors: light that comes by way of one arrives as if the mirror were a window, and the scene behind it again.
 //!
-//! *Ours*: a path finds a lamp in a mirror only where scattering happens to go there, so that a wall with a window's reflection on it is
-//! full of bright dots. An emitter is therefore drawn in each of a scene's few large mirrors, too: for where the receiver seems to be behind it, and
-//! weighted against scattering as any other emitter sample, where paths go by [`super::efficiency`]; all others have twins on the GPU, which
-//! find such light by chance. Lamps without extent are left out, which no scattered ray can meet either:
+//! *Ours*: a path finds a lamp in a mirror only where scattering happens to go there, so that a wall with a window's reflection on
+//! it is full of bright dots. An emitter is therefore drawn in each of a scene's few large mirrors, too: for where the receiver seems
+//! to be behind it, and weighted against scattering as any other emitter sample, where paths go by [`super::efficiency`]; all others
+//! have twins on the GPU, which find such light by chance. Lamps without extent are left out, which no scattered ray can meet either:
 //! what is computed stays what it is.
 
 use super::light_tree::Receiver;
 use super::lights::Near;
 use super::met::Found;
-use super::{Sampler, World};
-use crate::base::math::Basis;
+use super::{Sampler, World, round_light};
+use crate::base::math::{Basis, reflect};
 use crate::base::ray::{Hit, Ray};
 use crate::material::Surface;
 use crate::material::bsdf::Bsdf;
@@ -41,8 +41,6 @@ const EVEN: f32 = 1e-4;
 pub struct Mirrors {
     /// At most [`MOST`].
     planes: Vec<Mirror>,
-    /// Their triangles, sorted, each with its plane.
-    triangles: Vec<(u32, u8)>,
     /// Around all emitters that are drawn in them.
     lamps: Ball,
 }
@@ -57,11 +55,10 @@ struct Ball {
 /// A part of a plane that reflects.
 #[derive(Debug)]
 pub(super) struct Mirror {
-    /// Unit, on the front.
-    n: Vec3,
+    /// Its normal is that of the front.
+    axes: Basis,
     /// n · x of the plane's points.
     height: f32,
-    axes: Basis,
     /// Least and greatest coordinates of its corners along the axes.
     corners: [Vec2; 2],
     /// Around it.
@@ -69,6 +66,7 @@ pub(super) struct Mirror {
     /// Whether front and back reflect.
     sides: [bool; 2],
     area: f32,
+    /// Ascending.
     triangles: Vec<u32>,
 }
 
@@ -77,15 +75,19 @@ impl Mirrors {
     pub(super) fn of(world: &World) -> Self {
         let World { scene, lights, .. } = world;
         let Some(lamps) = lamps(&scene.geometry, &lights.near) else { return Self::default() };
+        let sides_of = |object: &Object| {
+            let material = &scene.materials[object.material as usize];
+            if material.opacity.is_some() { [false; 2] } else { sides(&material.bsdf) }
+        };
+        let objects = scene.geometry.objects.iter().map(|object| (object, sides_of(object)));
+        let objects: Vec<_> = objects.filter(|(_, sides)| *sides != [false; 2]).collect();
+        if objects.is_empty() {
+            return Self::default();
+        }
         let (low, high) = scene.geometry.bounds();
         let diagonal = low.distance(high);
-        let of_object = |object: &Object| {
-            let material = &scene.materials[object.material as usize];
-            let sides = sides(&material.bsdf);
-            let mirrors = material.opacity.is_none() && sides != [false; 2];
-            if mirrors { planes(&scene.geometry, object, sides, EVEN * diagonal) } else { Vec::new() }
-        };
-        let mut planes: Vec<Mirror> = scene.geometry.objects.iter().flat_map(of_object).collect();
+        let of_object = |(object, sides)| planes(&scene.geometry, object, sides, EVEN * diagonal);
+        let mut planes: Vec<Mirror> = objects.into_iter().flat_map(of_object).collect();
         planes.sort_by(|a, b| b.area.total_cmp(&a.area));
         planes.truncate(PLANES);
         let least = planes.first().map_or(0.0, |largest| (LEAST[0] * diagonal * diagonal).max(LEAST[1] * largest.area));
@@ -97,10 +99,7 @@ impl Mirrors {
         });
         planes.truncate(MOST);
         planes.iter_mut().for_each(|plane| plane.ball = plane.around());
-        let of = |(i, plane): (usize, &Mirror)| plane.triangles.iter().map(|&t| (t, i as u8)).collect::<Vec<_>>();
-        let mut triangles: Vec<_> = planes.iter().enumerate().flat_map(of).collect();
-        triangles.sort_unstable();
-        Self { planes, triangles, lamps }
+        Self { planes, lamps }
     }
 
     /// How many there are.
@@ -117,33 +116,30 @@ impl Mirrors {
         })
     }
 
-    /// Whether a triangle is a part of a mirror.
-    pub(super) fn has(&self, mirror: &Mirror, triangle: u32) -> bool {
-        self.of_triangle(triangle).is_some_and(|found| std::ptr::eq(found, mirror))
-    }
-
-    fn of_triangle(&self, triangle: u32) -> Option<&Mirror> {
-        let found = self.triangles.binary_search_by_key(&triangle, |t| t.0).ok()?;
-        self.planes.get(self.triangles[found].1 as usize)
-    }
-
-    /// Where a ray seems to come from, and how it was found, that goes on from the surface of a mirror: from behind it. `None` elsewhere, and where
-    /// no emitter sample in this mirror competes with it.
+    /// Where a ray seems to come from, and how it was found, that goes on from the surface of a mirror: from behind it. `None`
+    /// elsewhere, and where no emitter sample in this mirror competes with it.
     #[inline]
     pub(super) fn behind(&self, s: &Surface, from: &Receiver, found: Found) -> Option<(Receiver, Found)> {
-        if self.planes.is_empty() || found.delta || found.mirrored {
+        if found.delta || found.mirrored {
             return None;
         }
-        Some((self.of_triangle(s.triangle)?.image(from)?, Found { mirrored: true, ..found }))
+        let mirror = self.planes.iter().find(|mirror| mirror.has(s.triangle))?;
+        Some((mirror.image(from)?, Found { mirrored: true, ..found }))
     }
 }
 
 impl Mirror {
+    /// Whether a triangle is a part of it.
+    pub(super) fn has(&self, triangle: u32) -> bool {
+        self.triangles.binary_search(&triangle).is_ok()
+    }
+
     /// A receiver as a mirror shows it; `None` on a side that does not reflect.
     fn image(&self, of: &Receiver) -> Option<Receiver> {
-        let above = self.n.dot(of.p) - self.height;
+        let n = self.axes.n;
+        let above = n.dot(of.p) - self.height;
         let reflects = self.sides[usize::from(above < 0.0)] && above != 0.0;
-        reflects.then(|| Receiver { p: of.p - 2.0 * above * self.n, n: self.reflected(of.n) })
+        reflects.then(|| Receiver { p: of.p - 2.0 * above * n, n: self.reflected(of.n) })
     }
 
     /// Whether a straight way may lead from the image of a receiver through the mirror to something in a ball.
@@ -157,7 +153,7 @@ impl Mirror {
     fn around(&self) -> Ball {
         let [low, high] = self.corners;
         let at = (low + high) * 0.5;
-        Ball { centre: self.axes.s * at.x + self.axes.t * at.y + self.n * self.height, radius: low.distance(high) * 0.5 }
+        Ball { centre: self.axes.s * at.x + self.axes.t * at.y + self.axes.n * self.height, radius: low.distance(high) * 0.5 }
     }
 
     /// Whether much can be seen from the front (0), or from the back (1).
@@ -177,12 +173,12 @@ impl Mirror {
 
     /// A direction as the mirror shows it.
     pub(super) fn reflected(&self, d: Vec3) -> Vec3 {
-        d - 2.0 * self.n.dot(d) * self.n
+        -reflect(d, self.axes.n)
     }
 
     /// Whether the way from an image behind the mirror, in a unit direction and so far, may lead through it.
     pub(super) fn is_passed(&self, from: &Receiver, d: Vec3, distance: f32) -> bool {
-        let t = (self.height - self.n.dot(from.p)) / self.n.dot(d);
+        let t = (self.height - self.axes.n.dot(from.p)) / self.axes.n.dot(d);
         if !(t > 0.0 && t < distance) {
             return false;
         }
@@ -203,16 +199,12 @@ impl Ball {
 /// A ball around all emitters that have an extent; `None` where none has.
 fn lamps(geometry: &Geometry, near: &[Near]) -> Option<Ball> {
     let corners = |near: &Near| match near {
-        Near::Triangle(triangle) => {
-            let [a, b, c] = geometry.corners(triangle.index);
-            vec![a, b, c, if triangle.parallelogram { a + c - b } else { a }]
-        }
-        Near::Round(round) => geometry.rounds[*round as usize].bounds().map(|p| p.as_vec3()).to_vec(),
-        Near::Delta(_) => Vec::new(),
+        Near::Triangle(triangle) => Some(triangle.bounds(geometry, 0.0).corners),
+        Near::Round(round) => Some(round_light::bounds(&geometry.rounds[*round as usize], 0.0).corners),
+        Near::Delta(_) => None,
     };
-    let of = |(low, high): (Vec3, Vec3), p: Vec3| (low.min(p), high.max(p));
-    let (low, high) = near.iter().flat_map(corners).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), of);
-    low.cmple(high).all().then(|| Ball { centre: (low + high) * 0.5, radius: low.distance(high) * 0.5 })
+    let [low, high] = near.iter().filter_map(corners).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
+    Some(Ball { centre: (low + high) * 0.5, radius: low.distance(high) * 0.5 })
 }
 
 fn in_plane(axes: &Basis, p: Vec3) -> Vec2 {
@@ -233,9 +225,9 @@ fn planes(geometry: &Geometry, object: &Object, sides: [bool; 2], thin: f32) -> 
     let mut planes: Vec<Mirror> = Vec::new();
     for triangle in object.triangles.clone().filter(|&t| geometry.round(t).is_none()) {
         let corners = geometry.corners(triangle);
-        let Some(n) = front(geometry, object, triangle) else { continue };
+        let Some(n) = front(geometry, triangle) else { continue };
         let height = n.dot(corners[0]);
-        let same = |plane: &Mirror| plane.n.distance(n) < EVEN && (plane.height - height).abs() < thin;
+        let same = |plane: &Mirror| plane.axes.n.distance(n) < EVEN && (plane.height - height).abs() < thin;
         let found = planes.iter().position(same).unwrap_or(planes.len());
         if found == planes.len() {
             if planes.len() == PLANES {
@@ -243,7 +235,7 @@ fn planes(geometry: &Geometry, object: &Object, sides: [bool; 2], thin: f32) -> 
             }
             let (axes, corners) = (Basis::from_normal(n), [Vec2::INFINITY, Vec2::NEG_INFINITY]);
             let (ball, triangles) = (Ball::default(), Vec::new());
-            planes.push(Mirror { n, height, axes, corners, ball, sides, area: 0.0, triangles });
+            planes.push(Mirror { axes, height, corners, ball, sides, area: 0.0, triangles });
         }
         let plane = &mut planes[found];
         plane.triangles.push(triangle);
@@ -256,12 +248,9 @@ fn planes(geometry: &Geometry, object: &Object, sides: [bool; 2], thin: f32) -> 
 }
 
 /// The unit normal of a triangle's front; `None` where it is shaded as if it curved.
-fn front(geometry: &Geometry, object: &Object, triangle: u32) -> Option<Vec3> {
-    let n = unit_normal(geometry.corners(triangle))?;
-    if object.face_normals {
-        return Some(n);
-    }
-    let normals = geometry.triangles[triangle as usize].map(|i| geometry.normals[i as usize]);
-    let n = n * 1f32.copysign(n.dot(normals[0]));
+fn front(geometry: &Geometry, triangle: u32) -> Option<Vec3> {
+    let ng = unit_normal(geometry.corners(triangle))?;
+    let normals = geometry.shading_normals(triangle, ng);
+    let n = ng * 1f32.copysign(ng.dot(normals[0]));
     normals.iter().all(|other| other.distance(n) < EVEN).then_some(n)
 }

@@ -62,10 +62,10 @@ impl<'a> Vertex<'a> {
 
     /// Next-event estimation by way of the mirrors, by the numbers that the sample of [`Vertex::direct`] was drawn by.
     #[inline]
-    pub(super) fn in_mirrors(&self, from: &Receiver, choice: f32, v: Vec2) -> Rgb {
+    pub(super) fn in_mirrors(&self, from: &Receiver, [x, y, choice, _]: [f32; 4]) -> Rgb {
         let mut sum = Rgb::ZERO;
         for (mirror, behind) in self.world.mirrors.before(from) {
-            sum += self.in_mirror(mirror, &behind, choice, v).unwrap_or(Rgb::ZERO);
+            sum += self.in_mirror(mirror, &behind, choice, Vec2::new(x, y)).unwrap_or(Rgb::ZERO);
         }
         sum
     }
@@ -82,7 +82,7 @@ impl<'a> Vertex<'a> {
         if value == Rgb::ZERO {
             return None;
         }
-        let met = world.intersect(&self.surface.spawn(wi)).filter(|met| world.mirrors.has(mirror, met.triangle))?;
+        let met = world.intersect(&self.surface.spawn(wi)).filter(|met| mirror.has(met.triangle))?;
         let reflection = Vertex::scattering(world, &met, -wi, Query::default()).sample(0.5, Vec2::splat(0.5))?;
         let seen = !world.occluded(&light.shadow_ray(&met));
         seen.then(|| light.weight * value * reflection.weight * power_heuristic(light.pdf, pdf))

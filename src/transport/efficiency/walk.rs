@@ -120,8 +120,7 @@ impl Walk<'_> {
             let numbers = if k == 0 { emitter } else { sampler.branch(k << 16 | start.depth).next_4d() };
             let mut direct = vertex.direct(if k == 0 { first } else { light(numbers) });
             if in_mirrors {
-                let [x, y, choice, _] = numbers;
-                direct += vertex.in_mirrors(&from, choice, Vec2::new(x, y));
+                direct += vertex.in_mirrors(&from, numbers);
             }
             let estimate = Estimate { light: keep_finite(direct), cost: DIRECT_COST };
             self.record(&reached, Kind::Direct, &estimate);
