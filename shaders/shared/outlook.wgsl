@@ -1,4 +1,4 @@
-// What of the sky is drawn from where. Twin: src/transport/outlook.rs.
+// What of the sky is drawn from where. Twins: src/transport/outlook.rs, src/transport/shares.rs, src/transport/places.rs.
 
 // #include "shared/envmap.wgsl"
 // #include "shared/light_tree.wgsl"

@@ -9,25 +9,17 @@
 //! In: a scene's surfaces and environments. Out: for a receiver, the density of the two numbers.
 
 use super::light_tree::Receiver;
-use super::places::{middle_of, side_of};
+use super::places::{BOTH, Grid, SIDES};
+use super::shares::{PARTS, Shares, part, smoothed};
 use super::{Sampler, World};
 use crate::base::math::{hash_words, luminance};
 use crate::base::ray::Hit;
 use crate::material::Surface;
-use bytemuck::{Pod, Zeroable};
-use glam::{UVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-
-/// Parts along either side of the square of numbers.
-pub(crate) const SIDE: usize = 16;
-const PARTS: usize = SIDE * SIDE;
 
 /// Cells along the longest side of where the surfaces are.
 const ACROSS: f32 = 16.0;
-
-/// Sides of a cell: normals by their largest component and its sign, and one for receivers on both sides.
-pub(crate) const SIDES: usize = 7;
-pub(crate) const BOTH: usize = 6;
 
 /// Points on surfaces.
 const POINTS: u32 = 1 << 16;
@@ -36,8 +28,7 @@ const POINTS: u32 = 1 << 16;
 const DRAWN: usize = 4;
 const SETS: usize = 16;
 
-/// Cells along an edge of a block, whose mean stands for what cells have not drawn, and how many directions a part it counts for.
-const BLOCK: u32 = 4;
+/// How many directions a part the mean of a block counts for.
 const PRIOR: f32 = 0.5;
 
 /// Share that goes to all parts alike, whatever they bring.
@@ -70,7 +61,7 @@ impl Outlook {
             return None;
         }
         let hits = points(world)?;
-        let grid = Grid::over(hits.iter().map(|hit| world.point(hit)).collect());
+        let grid = Grid::over(hits.iter().map(|hit| world.point(hit)).collect(), ACROSS);
         let cells = cells(world, &grid, &hits);
         let mut this = Self { which: vec![NONE; grid.cells() * SIDES], grid, shares: Vec::new(), environments };
         for e in 0..environments {
@@ -100,12 +91,12 @@ impl Outlook {
                     *mine = (*mine * DRAWN as f32 + sum / count * PRIOR) / (DRAWN as f32 + PRIOR);
                 }
             }
-            (*side, Shares::new(&all))
+            (*side, shares_of(&all))
         };
         let of_both = both
             .iter()
             .enumerate()
-            .filter_map(|(cell, squares)| Some(((cell * SIDES + BOTH) as u32, Shares::new(squares.as_ref()?))));
+            .filter_map(|(cell, squares)| Some(((cell * SIDES + BOTH) as u32, shares_of(squares.as_ref()?))));
         let all: Vec<_> = looked.iter().map(of_side).chain(of_both).collect();
         for (i, (side, shares)) in all.into_iter().enumerate() {
             if environment == 0 {
@@ -131,6 +122,11 @@ impl Outlook {
     pub fn density(&self, environment: usize, receiver: &Receiver, v: impl FnOnce() -> Vec2) -> f32 {
         self.shares(environment, receiver).map_or(1.0, |shares| shares.density(v()))
     }
+}
+
+/// By the root of the mean square of what each part brings, which has the least variance.
+fn shares_of(squares: &Squares) -> Shares {
+    Shares::new(&smoothed(squares).map(f32::sqrt), EVEN)
 }
 
 fn add(sum: &mut Squares, more: &Squares) {
@@ -217,146 +213,6 @@ fn look(world: &World, points: &[Point], directions: &[Direction]) -> Squares {
         }
     }
     squares
-}
-
-/// The part that two numbers lie in.
-fn part(v: Vec2) -> usize {
-    let [x, y] = [v.x, v.y].map(|u| ((u * SIDE as f32) as usize).min(SIDE - 1));
-    y * SIDE + x
-}
-
-/// Shares of the parts: of the rows, and along each row.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct Shares {
-    rows: Edges,
-    columns: [Edges; SIDE],
-}
-
-/// Words that the GPU has of one.
-#[cfg(test)]
-pub(crate) const SHARE_WORDS: usize = size_of::<Shares>() / size_of::<u32>();
-
-impl Shares {
-    /// By the root of the mean square of what each part brings, which has the least variance; of parts and those beside them together, as
-    /// each has been drawn a few times.
-    fn new(squares: &[f32; PARTS]) -> Self {
-        let roots: Vec<f32> = (0..PARTS).map(|i| around(squares, i).sqrt()).collect();
-        let total: f32 = roots.iter().sum();
-        let even = 1.0 / PARTS as f32;
-        let share = |root: f32| if total > 0.0 && total.is_finite() { EVEN * even + (1.0 - EVEN) * root / total } else { even };
-        let shares: Vec<f32> = roots.into_iter().map(share).collect();
-        let row = |y: usize| &shares[y * SIDE..(y + 1) * SIDE];
-        let rows = Edges::new(std::array::from_fn(|y| row(y).iter().sum()));
-        Self { rows, columns: std::array::from_fn(|y| Edges::new(std::array::from_fn(|x| row(y)[x]))) }
-    }
-
-    fn draw(&self, v: Vec2) -> (Vec2, f32) {
-        let (row, y, height) = self.rows.pick(v.y);
-        let (column, x, width) = self.columns[row].pick(v.x);
-        ((Vec2::new(column as f32, row as f32) + Vec2::new(x, y)) / SIDE as f32, height * width * PARTS as f32)
-    }
-
-    fn density(&self, v: Vec2) -> f32 {
-        let (row, column) = (part(v) / SIDE, part(v) % SIDE);
-        self.rows.share(row) * self.columns[row].share(column) * PARTS as f32
-    }
-}
-
-/// What parts at the edges of a part count for beside it.
-const BESIDE: f32 = 0.25;
-
-/// Mean of a part and those beside it, those at its corners by the square of [`BESIDE`].
-fn around(squares: &[f32; PARTS], i: usize) -> f32 {
-    let (mut sum, mut weights) = (0.0, 0.0);
-    let beside = |at: usize| at.saturating_sub(1)..(at + 2).min(SIDE);
-    for y in beside(i / SIDE) {
-        for x in beside(i % SIDE) {
-            let weight = BESIDE.powi((x != i % SIDE) as i32 + (y != i / SIDE) as i32);
-            sum += weight * squares[y * SIDE + x];
-            weights += weight;
-        }
-    }
-    sum / weights
-}
-
-/// Where steps of a distribution begin, as shares of 2^16.
-#[repr(transparent)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Edges([u16; SIDE]);
-
-pub(crate) const WHOLE: f32 = 65536.0;
-
-impl Edges {
-    /// Steps in proportion to `shares`, none of which is below a 2000th of all.
-    fn new(shares: [f32; SIDE]) -> Self {
-        let total: f32 = shares.iter().sum();
-        let mut sum = 0.0;
-        Self(shares.map(|share| {
-            let edge = (sum / total * WHOLE) as u16;
-            sum += share;
-            edge
-        }))
-    }
-
-    fn ends(&self, step: usize) -> [f32; 2] {
-        [f32::from(self.0[step]), self.0.get(step + 1).map_or(WHOLE, |&edge| f32::from(edge))]
-    }
-
-    fn share(&self, step: usize) -> f32 {
-        let [begin, end] = self.ends(step);
-        (end - begin) / WHOLE
-    }
-
-    /// The step that `u` falls on, where in it, and its share.
-    fn pick(&self, u: f32) -> (usize, f32, f32) {
-        let at = (u * WHOLE) as u16;
-        let step = self.0[1..].iter().filter(|&&edge| edge <= at).count();
-        let [begin, end] = self.ends(step);
-        (step, ((u * WHOLE - begin) / (end - begin)).clamp(0.0, 1.0 - f32::EPSILON), (end - begin) / WHOLE)
-    }
-}
-
-/// Cubes of space.
-#[derive(Debug)]
-pub(crate) struct Grid {
-    pub(crate) corner: Vec3,
-    pub(crate) per_metre: f32,
-    pub(crate) size: UVec3,
-}
-
-impl Grid {
-    /// Over [`middle_of`] points.
-    fn over(points: Vec<Vec3>) -> Self {
-        let [corner, end] = middle_of(points);
-        let extent = end - corner;
-        let longest = extent.max_element();
-        let per_metre = if longest > 0.0 { ACROSS / longest } else { 0.0 };
-        let size = (extent * per_metre).ceil().clamp(Vec3::ONE, Vec3::splat(ACROSS)).as_uvec3();
-        Self { corner, per_metre, size }
-    }
-
-    fn cells(&self) -> usize {
-        self.size.element_product() as usize
-    }
-
-    fn index(&self, cell: UVec3) -> u32 {
-        (cell.z * self.size.y + cell.y) * self.size.x + cell.x
-    }
-
-    /// The side of a cell that a receiver is on.
-    fn side(&self, receiver: &Receiver) -> u32 {
-        let at = ((receiver.p - self.corner) * self.per_metre).max(Vec3::ZERO).as_uvec3().min(self.size - 1);
-        let side = if receiver.n == Vec3::ZERO { BOTH as u32 } else { side_of(receiver.n) };
-        self.index(at) * SIDES as u32 + side
-    }
-
-    /// The same side of the block that a cell is in, by the block's first cell.
-    fn block(&self, side: u32) -> usize {
-        let (cell, side) = (side / SIDES as u32, side % SIDES as u32);
-        let at = UVec3::new(cell, cell / self.size.x, cell / self.size.x / self.size.y) % self.size / BLOCK * BLOCK;
-        (self.index(at) * SIDES as u32 + side) as usize
-    }
 }
 
 #[cfg(test)]
@@ -490,34 +346,12 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_a_density_and_what_is_drawn_has_it() {
-        let world = room(sky()).with_outlook();
-        let outlook = world.lights.outlook.as_ref().unwrap();
-        for shares in outlook.shares.iter().step_by(50) {
-            let total: f32 =
-                (0..PARTS).map(|i| shares.density(Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) / SIDE as f32)).sum();
-            assert!((total / PARTS as f32 - 1.0).abs() < 1e-4, "{total}");
-            let mut found = [0u32; PARTS];
-            for k in 0..4096 {
-                let (v, density) = shares.draw(Sampler::new(3, k).next_2d());
-                found[part(v)] += 1;
-                assert!(density == shares.density(v) && density >= 0.9 * EVEN, "{v}: {density}");
-            }
-            // Stratified by rows and columns, so that parts are off by a few numbers at the most.
-            for (i, &n) in found.iter().enumerate() {
-                let expected = 16.0 * shares.density(Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) / SIDE as f32);
-                assert!((n as f32 - expected).abs() < 4.0 * expected.sqrt() + 4.0, "part {i}: {n}, not {expected}");
-            }
-        }
-    }
-
-    #[test]
     fn threads_do_not_change_it_and_without_a_sky_there_is_none() {
         let shares = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let world = pool.install(|| room(sky()).with_outlook());
             let outlook = world.lights.outlook.as_ref().unwrap();
-            (outlook.which.clone(), outlook.shares.iter().map(|s| (s.rows.0, s.columns.map(|c| c.0))).collect::<Vec<_>>())
+            (outlook.which.clone(), outlook.shares.iter().map(|s| bytemuck::bytes_of(s).to_vec()).collect::<Vec<_>>())
         };
         assert_eq!(shares(1), shares(3));
         let point = Emitter::Point { position: Vec3::ZERO, intensity: Rgb::ONE };

@@ -17,7 +17,7 @@ use crate::method::many_light::{
 use crate::method::radiance_probes::{gpu as gpu_radiance_probes, light, seen, shade as shade_of_radiance_probes, volume};
 use crate::method::{image_space_gather, ulr};
 use crate::probe::{neighbors, parameter_map as qhmap};
-use crate::transport::{bvh, light_tree, outlook, path, sampler};
+use crate::transport::{bvh, light_tree, path, places, sampler, shares};
 use crate::view::{denoise, direct, mirror, mirror_light};
 use std::f32::consts;
 use wgpu::naga::{Expression, Handle, Literal, Module};
@@ -171,12 +171,12 @@ fn twins(file: &str) -> Twins {
         },
         "shared/glossy_direct.wgsl" => twins! { GLOSSY_BRANCH = direct::GLOSSY_BRANCH; },
         "shared/outlook.wgsl" => twins! {
-            SIDE = outlook::SIDE;
-            SIDES = outlook::SIDES;
-            BOTH = outlook::BOTH;
-            WHOLE = outlook::WHOLE;
+            SIDE = shares::SIDE;
+            SIDES = places::SIDES;
+            BOTH = places::BOTH;
+            WHOLE = shares::WHOLE;
             HEADER = lights::OUTLOOK_HEADER;
-            SHARES = outlook::SHARE_WORDS;
+            SHARES = shares::SHARE_WORDS;
         },
         "shared/light_tree.wgsl" => twins! {
             BACK = light_tree::BACK;
