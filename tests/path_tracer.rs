@@ -261,7 +261,7 @@ fn mirror(reflectance: Rgb) -> Bsdf {
 
 /// [`radiance`] of a surface that does not emit, by paths that draw emitters in mirrors.
 fn walked(world: &World, ray: &Ray, params: &PathParams, sampler: &mut Sampler) -> Rgb {
-    let mut walk = Walk { world, params, plan: None, tally: None };
+    let mut walk = Walk { world, params, plan: None, lessons: None };
     let numbers = walk.numbers(sampler);
     let surface = world.seen(ray).unwrap();
     walk.scattered(numbers, &surface, -ray.d, Query::default(), Start::seen(Rgb::ONE), sampler).light

@@ -5,6 +5,7 @@ pub mod efficiency;
 pub mod envmap;
 pub mod facet;
 pub mod follow;
+pub mod guide;
 pub mod light_sample;
 pub mod light_tree;
 mod light_triangle;

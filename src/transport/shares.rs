@@ -95,20 +95,18 @@ const BESIDE: f32 = 0.25;
 
 /// Each part's mean with those beside it, those at its corners by the square of [`BESIDE`]: for what each has been drawn for a few times only.
 pub(super) fn smoothed(values: &[f32; PARTS]) -> [f32; PARTS] {
-    std::array::from_fn(|i| around(values, i))
-}
-
-fn around(values: &[f32; PARTS], i: usize) -> f32 {
-    let (mut sum, mut weights) = (0.0, 0.0);
-    let beside = |at: usize| at.saturating_sub(1)..(at + 2).min(SIDE);
-    for y in beside(i / SIDE) {
-        for x in beside(i % SIDE) {
-            let weight = BESIDE.powi((x != i % SIDE) as i32 + (y != i / SIDE) as i32);
-            sum += weight * values[y * SIDE + x];
-            weights += weight;
-        }
+    let mut along = *values;
+    for step in [1, SIDE] {
+        let of = along;
+        let mean = |i: usize| {
+            let at = i / step % SIDE;
+            let (before, after) = (if at > 0 { BESIDE } else { 0.0 }, if at + 1 < SIDE { BESIDE } else { 0.0 });
+            let sum = of[i] + before * of[i.wrapping_sub(step) % PARTS] + after * of[(i + step) % PARTS];
+            sum / (1.0 + before + after)
+        };
+        along = std::array::from_fn(mean);
     }
-    sum / weights
+    along
 }
 
 #[cfg(test)]
@@ -137,6 +135,22 @@ mod tests {
                 assert!((n as f32 - expected).abs() < 4.0 * expected.sqrt() + 4.0, "part {i}: {n}, not {expected}");
             }
         }
+    }
+
+    #[test]
+    fn parts_share_with_those_beside_them() {
+        let one = |at: usize| smoothed(&std::array::from_fn(|i| f32::from(i == at)));
+        let middle = 5 * SIDE + 7;
+        let [inside, corner] = [one(middle), one(0)];
+        let w = 1.0 / 1.5;
+        for (offset, weight) in [(0, 1.0), (1, 0.25), (SIDE, 0.25), (SIDE + 1, 0.0625), (2, 0.0)] {
+            assert!(
+                (inside[middle + offset] - weight * w * w).abs() < 1e-6 && inside[middle - offset] == inside[middle + offset]
+            );
+        }
+        // What is at the border has fewer beside it.
+        assert!((corner[0] - 0.64).abs() < 1e-6 && (corner[1] - 0.2 * w).abs() < 1e-6 && corner[SIDE - 1] == 0.0);
+        assert!(smoothed(&[3.0; PARTS]).iter().all(|x| (x - 3.0).abs() < 1e-6));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! A point of a path where light arrives: what it makes of light straight from emitters, and where a path may go on.
 
 use super::World;
+use super::guide::{Guide, Guided};
 use super::light_sample::LightSample;
 use super::light_tree::Receiver;
 use super::met::power_heuristic;
@@ -24,6 +25,7 @@ pub(super) struct Vertex<'a> {
     pub(super) world: &'a World,
     pub(super) surface: &'a Surface,
     measure: Measure<'a>,
+    guided: Option<Guided<'a>>,
 }
 
 /// Where a surface that scatters light to `wo` sees emitters from: on the viewer's side, or on both where light passes through it.
@@ -37,12 +39,25 @@ impl<'a> Vertex<'a> {
     /// Where light is scattered to `wo` (unit, world, away from the surface).
     pub(super) fn scattering(world: &'a World, surface: &'a Surface, wo: Vec3, query: Query) -> Self {
         let at = world.scene.bsdf(surface).at(surface, surface.frame.to_local(wo), query);
-        Self { world, surface, measure: Measure::Scattering(at) }
+        Self { world, surface, measure: Measure::Scattering(at), guided: None }
     }
 
     /// Where light is to pass into the diffuse layer, on the side of the frame's normal (1) or behind it (-1).
     pub(super) fn irradiance(world: &'a World, surface: &'a Surface, side: f32) -> Self {
-        Self { world, surface, measure: Measure::Irradiance { side } }
+        Self { world, surface, measure: Measure::Irradiance { side }, guided: None }
+    }
+
+    /// From now on draws directions as a guide has it.
+    #[inline]
+    pub(super) fn follow(&mut self, guide: &'a Guide, from: &Receiver) {
+        if let Measure::Scattering(at) = &self.measure {
+            self.guided = guide.at(from, at);
+        }
+    }
+
+    /// Whether directions may be drawn from a diffuse lobe.
+    pub(super) fn is_diffuse(&self) -> bool {
+        matches!(&self.measure, Measure::Scattering(at) if at.first_diffuse().is_some_and(|first| first < 1.0))
     }
 
     fn bsdf(&self) -> &Bsdf {
@@ -92,7 +107,13 @@ impl<'a> Vertex<'a> {
     /// which [`Vertex::sample`] finds it.
     fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
         match &self.measure {
-            Measure::Scattering(at) => at.eval_pdf(wo),
+            Measure::Scattering(at) => {
+                let (value, pdf) = at.eval_pdf(wo);
+                match &self.guided {
+                    Some(guided) if value != Rgb::ZERO => (value, guided.pdf(pdf, &self.surface.frame, wo)),
+                    _ => (value, pdf),
+                }
+            }
             &Measure::Irradiance { side } if wo.z * side > 0.0 => {
                 let cos = wo.z * side;
                 (Rgb::splat(self.bsdf().diffuse_in(self.surface, wo) * cos), cos * FRAC_1_PI)
@@ -104,7 +125,13 @@ impl<'a> Vertex<'a> {
     /// Draws a local direction; its weight is the value of [`Vertex::eval_pdf`] over the density.
     pub(super) fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
         match &self.measure {
-            Measure::Scattering(at) => at.sample(u, v).filter(|s| s.weight != Rgb::ZERO),
+            Measure::Scattering(at) => {
+                let sample = match &self.guided {
+                    Some(guided) => guided.sample(at, &self.surface.frame, u, v),
+                    None => at.sample(u, v),
+                };
+                sample.filter(|s| s.weight != Rgb::ZERO)
+            }
             &Measure::Irradiance { side } => {
                 let (sin_phi, cos_phi) = (v.x * TAU).sin_cos();
                 let (cos, sin) = ((1.0 - v.y).sqrt(), v.y.sqrt());

@@ -74,6 +74,17 @@ impl<'a> At<'a> {
         }
     }
 
+    /// The first of the numbers `u` by which [`At::sample`] draws a cosine-weighted direction of the diffuse lobe; `None` of models that have none,
+    /// or more than one.
+    pub fn first_diffuse(&self) -> Option<f32> {
+        match &self.model {
+            Model::Diffuse(_) => Some(0.0),
+            Model::Plastic(model) => Some(model.first_diffuse()),
+            Model::RoughPlastic(model) => Some(model.first_diffuse()),
+            _ => None,
+        }
+    }
+
     /// [`super::Bsdf::sample`].
     pub fn sample(&self, u: f32, v: Vec2) -> Option<BsdfSample> {
         let sample = match &self.model {

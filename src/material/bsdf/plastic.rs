@@ -92,6 +92,10 @@ pub(super) struct PlasticAt<'a> {
 }
 
 impl PlasticAt<'_> {
+    pub(super) fn first_diffuse(&self) -> f32 {
+        self.coated.probability
+    }
+
     pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
         if wo.z <= 0.0 || !self.query.lobes.contains(Lobes::DIFFUSE) {
             return (Rgb::ZERO, 0.0);

@@ -81,6 +81,10 @@ pub(super) struct RoughPlasticAt<'a> {
 }
 
 impl RoughPlasticAt<'_> {
+    pub(super) fn first_diffuse(&self) -> f32 {
+        self.coated.probability
+    }
+
     pub(super) fn eval_pdf(&self, wo: Vec3) -> (Rgb, f32) {
         if wo.z <= 0.0 {
             return (Rgb::ZERO, 0.0);

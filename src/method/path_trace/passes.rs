@@ -1,21 +1,25 @@
-//! Frames in passes: the first samples of all pixels tell where paths are worth going on ([`crate::transport::efficiency`]), the rest go by
-//! that. All samples count alike; what one pass decides of the next leaves the mean where it was.
+//! Frames in passes: the first samples of all pixels tell where paths are worth going on, and where to
+//! ([`crate::transport::efficiency`]), and the next go by that. All samples count alike; what one pass decides of the next leaves the mean where it was.
 
 use super::{PathTraceParams, Samples};
 use crate::base::math::{Rgb, luminance};
 use crate::base::progress::Progress;
 use crate::base::ray::Ray;
 use crate::material::bsdf::{Lobes, Query};
-use crate::transport::efficiency::{Plan, RAY_COST, Start, Tally, Walk};
+use crate::transport::efficiency::{Lessons, RAY_COST, Start, Walk};
 use crate::transport::{Sampler, World};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Fewest samples a pixel for which passes pay.
 pub(super) const FEWEST: u32 = 16;
 
-/// Samples a pixel of the pass that learns, as a share of all, at least, and at most. A second one did not pay.
-const LEARNING: (u32, u32, u32) = (8, 4, 32);
+/// Samples a pixel of the first pass, whose variance tells something, and most that passes learn from, as a share of all, and in number. Each
+/// pass doubles what there is.
+const FIRST: u32 = 2;
+const LEARNING: (u32, u32) = (4, 64);
 
 /// Rows of pixels are followed in so many parts, each with a tally of its own.
 const BANDS: usize = 64;
@@ -55,16 +59,16 @@ pub(super) fn image<const N: usize>(
     let zero = [DVec3::ZERO; N];
     let mut pixels = vec![Pixel { sum: zero, pass: zero, squares: zero, cost: 0.0 }; width * height];
     let mut weights = vec![[Rgb::ONE; N]; width * height];
-    let mut tally = Tally::over(seen(world, samples));
+    let mut lessons = Lessons::over(seen(world, samples));
     let mut plan = None;
-    let (share, least, most) = LEARNING;
-    let learning = (params.spp / share).clamp(least, most);
-    for range in [0..learning, learning..params.spp] {
-        let learns = range.start == 0;
+    // Samples of rows.
+    let done = AtomicU64::new(0);
+    for range in passes(params.spp) {
+        let learns = range.end < params.spp;
         let rows = height.div_ceil(BANDS);
         let band = |(band, (pixels, weights)): (usize, (&mut [Pixel<N>], &[[Rgb; N]]))| {
-            let tally = learns.then(|| tally.empty());
-            let mut walk = Walk { world, params: &params.path, plan: plan.as_ref(), tally };
+            let lessons = learns.then(|| lessons.empty(width * height * range.len()));
+            let mut walk = Walk { world, params: &params.path, plan: plan.as_ref(), lessons };
             for (i, (pixel, weights)) in pixels.iter_mut().zip(weights).enumerate() {
                 let sample_at = samples.of((i % width) as u32, (band * rows + i / width) as u32);
                 (pixel.pass, pixel.squares, pixel.cost) = (zero, zero, 0.0);
@@ -73,21 +77,31 @@ pub(super) fn image<const N: usize>(
                     let (layers, cost) = trace(&mut walk, &ray, weights, &mut sampler);
                     pixel.add(&layers.map(|x| (x * weight).as_dvec3()), cost);
                 }
-                if !learns && i % width == width - 1 {
-                    progress.advance(1);
+                if i % width == width - 1 {
+                    let samples = range.len() as u64;
+                    let before = done.fetch_add(samples, Ordering::Relaxed);
+                    progress.advance((before + samples) / u64::from(params.spp) - before / u64::from(params.spp));
                 }
             }
-            walk.tally
+            walk.lessons
         };
         let parts = pixels.par_chunks_mut(rows * width).zip(weights.par_chunks(rows * width));
-        let tallies: Vec<Option<Tally>> = parts.enumerate().map(band).collect();
+        let learned: Vec<Option<Lessons>> = parts.enumerate().map(band).collect();
         if learns {
-            tallies.iter().flatten().for_each(|part| tally.absorb(part));
+            learned.iter().flatten().for_each(|part| lessons.absorb(part));
             weights = relative_to(&pixels, width, range.end);
-            plan = Some(Plan { moments: tally.moments(), efficiency: efficiency(&pixels, &weights, range.len()) });
+            plan = Some(lessons.plan(efficiency(&pixels, &weights, range.len())));
         }
     }
     pixels.iter().map(|p| p.sum.map(|s| (s / f64::from(params.spp)).as_vec3())).collect()
+}
+
+/// The samples of each pass; the last one learns nothing.
+fn passes(spp: u32) -> impl Iterator<Item = Range<u32>> {
+    let (share, most) = LEARNING;
+    let ends = std::iter::successors(Some(FIRST), |end| Some(end * 2)).take_while(move |&end| end <= most.min(spp / share));
+    let mut start = 0;
+    ends.chain([spp]).map(move |end| std::mem::replace(&mut start, end)..end)
 }
 
 impl<const N: usize> Pixel<N> {
@@ -182,4 +196,19 @@ pub(super) fn layers(walk: &mut Walk, ray: &Ray, weights: &[Rgb; 3], sampler: &m
         }
     }
     (layers, cost)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_double_what_there_is_until_they_have_learned_enough() {
+        let of = |spp| passes(spp).map(|range| range.end).collect::<Vec<_>>();
+        assert_eq!(of(FEWEST), [2, 4, 16]);
+        assert_eq!(of(33), [2, 4, 8, 33]);
+        assert_eq!(of(4096), [2, 4, 8, 16, 32, 64, 4096]);
+        let all: Vec<u32> = passes(100).flatten().collect();
+        assert_eq!(all, (0..100).collect::<Vec<_>>());
+    }
 }

@@ -18,8 +18,10 @@
 //! an estimate is counted in rays, so that images do not depend on the machine's speed. First vertices have one estimate of
 //! either kind: more gained less than it cost.
 
+mod lessons;
 mod moments;
 mod walk;
 
-pub use moments::{Estimate, Moments, RAY_COST, Tally};
-pub use walk::{Plan, Start, Walk};
+pub use lessons::{Lessons, Plan};
+pub use moments::{Estimate, RAY_COST};
+pub use walk::{Start, Walk};

@@ -1,6 +1,7 @@
 //! Paths that branch: one estimate of scattered radiance is a tree of vertices.
 
-use super::moments::{Estimate, Kind, Moments, RAY_COST, Tally};
+use super::lessons::{Lessons, Plan};
+use super::moments::{Estimate, Kind, RAY_COST};
 use crate::base::math::Rgb;
 use crate::base::ray::Ray;
 use crate::material::Surface;
@@ -22,15 +23,6 @@ const DEEP: u32 = 64;
 /// Most estimates there.
 const AT_MOST_DEEP: f32 = 0.5;
 
-/// What continuations of a path's vertices go by.
-#[derive(Debug)]
-pub struct Plan {
-    /// What estimates are like.
-    pub moments: Moments,
-    /// sqrt(C / V): cost and mean relative variance of one sample of a pixel.
-    pub efficiency: f32,
-}
-
 /// Cost of an emitter sample with its shadow ray.
 const DIRECT_COST: f32 = 0.8;
 
@@ -45,8 +37,8 @@ pub struct Walk<'a> {
     pub params: &'a PathParams,
     /// Of image and scene.
     pub plan: Option<&'a Plan>,
-    /// Takes in every estimate on the way.
-    pub tally: Option<Tally>,
+    /// Take in every estimate on the way.
+    pub lessons: Option<Lessons>,
 }
 
 /// What a path has become when it reaches a vertex.
@@ -114,7 +106,10 @@ impl Walk<'_> {
         // Before the textures are read, which have been asked for only now.
         let first = if emitters > 0 { light(emitter) } else { None };
         let in_mirrors = self.params.max_depth - start.depth > 1;
-        let vertex = Vertex::scattering(self.world, s, wo, query);
+        let mut vertex = Vertex::scattering(self.world, s, wo, query);
+        if let Some(plan) = self.plan {
+            vertex.follow(&plan.guide, &from);
+        }
         let share = Rgb::splat(1.0 / direct);
         for k in 0..emitters {
             let numbers = if k == 0 { emitter } else { sampler.branch(k << 16 | start.depth).next_4d() };
@@ -141,8 +136,8 @@ impl Walk<'_> {
     }
 
     fn record(&mut self, at: &Reached, kind: Kind, estimate: &Estimate) {
-        if let Some(tally) = self.tally.as_mut().filter(|_| at.query.lobes == Lobes::ALL) {
-            tally.record(at.s, at.direction, kind, estimate);
+        if let Some(lessons) = self.lessons.as_mut().filter(|_| at.query.lobes == Lobes::ALL) {
+            lessons.tally.record(at.s, at.direction, kind, estimate);
         }
     }
 
@@ -175,8 +170,11 @@ impl Walk<'_> {
             weight /= lives;
         }
         let ray = at.s.spawn(at.s.frame.to_world(sample.wo));
-        let (from, found) = at.start.behind.unwrap_or((*from, Found::by(&sample)));
-        let next = self.incident(&ray, &from, found, Start { weight, eta, depth, behind: None }, sampler);
+        let (seen_from, found) = at.start.behind.unwrap_or((*from, Found::by(&sample)));
+        let next = self.incident(&ray, &seen_from, found, Start { weight, eta, depth, behind: None }, sampler);
+        if let Some(lessons) = self.lessons.as_mut().filter(|_| !sample.delta && vertex.is_diffuse()) {
+            lessons.arrivals.record(from, ray.d, sample.pdf, keep_finite(next.light));
+        }
         let estimate = Estimate { light: keep_finite(sample.weight * next.light), cost: RAY_COST + next.cost };
         self.record(at, Kind::Onward, &estimate);
         Estimate { light: estimate.light / lives, ..estimate }
