@@ -10,7 +10,8 @@
 //! ```
 //!
 //! on average, with the variance V_r, the second moment E\[L_r²\] and the cost c_r of one such estimate. Whatever s is, the mean stays
-//! the same: a poor guess costs time alone.
+//! the same: a poor guess costs time alone. Where rays go that leave diffuse surfaces is learned from the same samples
+//! ([`crate::transport::guide`]).
 //!
 //! *Ours*: a vertex has two estimates, each with an s of its own: light from an emitter that is drawn (a shadow ray is left out
 //! where little can come of it), and what a ray onward brings, decided before the ray is cast. The moments lie in a grid of cells
@@ -23,5 +24,5 @@ mod moments;
 mod walk;
 
 pub use lessons::{Lessons, Plan};
-pub use moments::{Estimate, RAY_COST};
+pub use moments::{Estimate, Moments, RAY_COST};
 pub use walk::{Start, Walk};
