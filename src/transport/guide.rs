@@ -163,7 +163,7 @@ pub struct Guide {
 
 impl Guide {
     /// What is known of a place. `at` is what scatters there.
-    #[inline(never)]
+    #[inline]
     pub(super) fn at(&self, from: &Receiver, at: &At) -> Option<Guided<'_>> {
         let first = at.first_diffuse().filter(|first| *first < 1.0 && from.n != Vec3::ZERO)?;
         let side = self.grid.side(from);
@@ -173,7 +173,7 @@ impl Guide {
     }
 }
 
-/// A guide at a vertex. Its functions are calls, so that the compiler puts what is not guided where it was.
+/// A guide at a vertex.
 pub(super) struct Guided<'a> {
     shares: &'a Shares,
     axes: Axes,
@@ -183,7 +183,6 @@ pub(super) struct Guided<'a> {
 
 impl Guided<'_> {
     /// What [`At::sample`] is for where diffuse directions are guided; the model's frame is `frame`.
-    #[inline(never)]
     pub(super) fn sample(&self, at: &At, frame: &Basis, u: f32, v: Vec2) -> Option<BsdfSample> {
         if u < self.first {
             let sample = at.sample(u, v)?;
@@ -201,7 +200,6 @@ impl Guided<'_> {
     }
 
     /// Density of a direction that has `pdf` where diffuse directions are not guided.
-    #[inline(never)]
     pub(super) fn pdf(&self, pdf: f32, frame: &Basis, wo: Vec3) -> f32 {
         let density = self.shares.density(self.axes.numbers(frame.to_world(wo)));
         pdf + self.more(wo, density)
