@@ -251,6 +251,8 @@ mod tests {
     use crate::material::bsdf::{Bsdf, Distribution, Plastic, PlasticParams, Query, RoughPlastic};
     use crate::material::{Surface, Texture};
     use crate::transport::Sampler;
+    use crate::transport::places::side_of;
+    use crate::transport::shares::SIDE;
 
     /// Arrivals over a cube of two metres each way, with nothing in them.
     fn nothing() -> Arrivals {
@@ -274,7 +276,7 @@ mod tests {
     fn axes_turn_little_and_tell_directions_apart() {
         for i in 0..500 {
             let n = spread_over_sphere(i, 500);
-            let side = super::super::places::side_of(n);
+            let side = side_of(n);
             let axes = Axes::about(n, side);
             for k in 0..32 {
                 let v = Sampler::new(i, k).next_2d();
@@ -284,7 +286,7 @@ mod tests {
                 assert!(back.distance(v) < 1e-3 || d.dot(n) < 0.05, "{n}: {v} comes back as {back}");
             }
             let other = (n + spread_over_sphere((7 * i + 3) % 500, 500) * 0.02).normalize();
-            if super::super::places::side_of(other) == side {
+            if side_of(other) == side {
                 let apart = Axes::about(other, side).to_world(Vec3::X).distance(axes.to_world(Vec3::X));
                 assert!(apart < 0.06, "{n} and {other}: {apart}");
             }
@@ -388,7 +390,7 @@ mod tests {
 
     /// Whether a direction is next to the border of two parts.
     fn beside(guided: &Guided, d: Vec3) -> bool {
-        let v = guided.axes.numbers(d) * super::super::shares::SIDE as f32;
+        let v = guided.axes.numbers(d) * SIDE as f32;
         (v - v.round()).abs().min_element() < 1e-3
     }
 

@@ -21,7 +21,7 @@ pub(super) const FEWEST: u32 = 16;
 const FIRST: u32 = 2;
 const LEARNING: (u32, u32) = (4, 64);
 
-/// Rows of pixels are followed in so many parts, each with a tally of its own.
+/// Rows of pixels are followed in so many parts, each with lessons of its own.
 const BANDS: usize = 64;
 
 /// Added to the square of a pixel's radiance where errors are relative to it, as relative MSE has it, in scenes that are
