@@ -15,7 +15,7 @@ use super::shares::{PARTS, Shares, part, smoothed};
 use crate::base::math::{Basis, Rgb, hash64, luminance};
 use crate::material::bsdf::warp::{cosine_hemisphere, square};
 use crate::material::bsdf::{At, BsdfSample};
-use glam::{Vec2, Vec3, Vec3Swizzles};
+use glam::{Mat2, Vec2, Vec3, Vec3Swizzles};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 
@@ -162,47 +162,65 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// What is known of a place. `at` is what scatters there.
+    /// What is known of a place.
     #[inline]
-    pub(super) fn at(&self, from: &Receiver, at: &At) -> Option<Guided<'_>> {
-        let first = at.first_diffuse().filter(|first| *first < 1.0 && from.n != Vec3::ZERO)?;
+    pub(super) fn at(&self, from: &Receiver) -> Option<Known<'_>> {
         let side = self.grid.side(from);
-        let which = self.which[side as usize];
-        let axes = || Axes::about(from.n, side % SIDES as u32);
-        (which != NONE).then(|| Guided { shares: &self.shares[which as usize], axes: axes(), first })
+        let shares = self.shares.get(self.which[side as usize] as usize)?;
+        shares.prefetch();
+        Some(Known { shares, side: side % SIDES as u32 })
     }
+}
+
+/// What a guide knows of a place.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'a> {
+    shares: &'a Shares,
+    side: u32,
 }
 
 /// A guide at a vertex.
 pub(super) struct Guided<'a> {
     shares: &'a Shares,
-    axes: Axes,
+    /// From local x and y to the axes of the shares.
+    turn: Mat2,
+    /// The sign of the local z of the side that light is scattered to.
+    side: f32,
     /// The first of the numbers, which choose a lobe, that draws from the diffuse one.
     first: f32,
 }
 
-impl Guided<'_> {
-    /// What [`At::sample`] is for where diffuse directions are guided; the model's frame is `frame`.
-    pub(super) fn sample(&self, at: &At, frame: &Basis, u: f32, v: Vec2) -> Option<BsdfSample> {
+impl<'a> Guided<'a> {
+    /// For a model `at` a surface of a place of which something is known, seen as `from`, that has a diffuse lobe.
+    #[inline]
+    pub(super) fn new(known: &Known<'a>, from: &Receiver, frame: &Basis, at: &At) -> Option<Self> {
+        let first = at.first_diffuse().filter(|first| *first < 1.0)?;
+        let axes = Axes::about(from.n, known.side);
+        let turn = Mat2::from_cols(axes.across(frame.s), axes.across(frame.t));
+        Some(Self { shares: known.shares, turn, side: 1f32.copysign(from.n.dot(frame.n)), first })
+    }
+
+    /// What [`At::sample`] is for where diffuse directions are guided.
+    pub(super) fn sample(&self, at: &At, u: f32, v: Vec2) -> Option<BsdfSample> {
         if u < self.first {
             let sample = at.sample(u, v)?;
             if sample.delta {
                 return Some(sample);
             }
-            let pdf = self.pdf(sample.pdf, frame, sample.wo);
+            let pdf = self.pdf(sample.pdf, sample.wo);
             return Some(BsdfSample { weight: sample.weight * (sample.pdf / pdf), pdf, ..sample });
         }
         let (v, density) = self.shares.draw(v);
-        let wo = frame.to_local(self.axes.to_world(cosine_hemisphere(v)));
+        let d = cosine_hemisphere(v);
+        let wo = (self.turn.transpose() * d.xy()).extend(d.z * self.side);
         let (value, pdf) = at.eval_pdf(wo);
         let pdf = pdf + self.more(wo, density);
         (pdf > 0.0 && pdf.is_finite()).then(|| BsdfSample { wo, weight: value / pdf, pdf, delta: false, eta: 1.0 })
     }
 
     /// Density of a direction that has `pdf` where diffuse directions are not guided.
-    pub(super) fn pdf(&self, pdf: f32, frame: &Basis, wo: Vec3) -> f32 {
-        let density = self.shares.density(self.axes.numbers(frame.to_world(wo)));
-        pdf + self.more(wo, density)
+    pub(super) fn pdf(&self, pdf: f32, wo: Vec3) -> f32 {
+        pdf + self.more(wo, self.shares.density(square(self.turn * wo.xy())))
     }
 
     /// What a density of the two numbers adds to that of a direction.
@@ -224,14 +242,14 @@ impl Axes {
         Self { along, basis: Basis::from_normal(turned(n, along)) }
     }
 
-    fn to_world(&self, local: Vec3) -> Vec3 {
-        // Twice more are three times: back to where it was.
-        turned(turned(self.basis.to_world(local), self.along), self.along)
+    /// Coordinates of a direction along the two that lie in the surface.
+    fn across(&self, d: Vec3) -> Vec2 {
+        self.basis.to_local(turned(d, self.along)).xy()
     }
 
     /// Numbers from which [`cosine_hemisphere`] makes a direction.
     fn numbers(&self, d: Vec3) -> Vec2 {
-        square(self.basis.to_local(turned(d, self.along)).xy())
+        square(self.across(d))
     }
 }
 
@@ -272,6 +290,11 @@ mod tests {
         arrivals
     }
 
+    fn to_world(axes: &Axes, local: Vec3) -> Vec3 {
+        // Twice more are three times: back to where it was.
+        turned(turned(axes.basis.to_world(local), axes.along), axes.along)
+    }
+
     #[test]
     fn axes_turn_little_and_tell_directions_apart() {
         for i in 0..500 {
@@ -280,17 +303,21 @@ mod tests {
             let axes = Axes::about(n, side);
             for k in 0..32 {
                 let v = Sampler::new(i, k).next_2d();
-                let d = axes.to_world(cosine_hemisphere(v));
+                let d = to_world(&axes, cosine_hemisphere(v));
                 assert!((d.dot(n) - (1.0 - square_of(v)).sqrt()).abs() < 1e-3, "{n}: {v} is {d}");
                 let back = axes.numbers(d);
                 assert!(back.distance(v) < 1e-3 || d.dot(n) < 0.05, "{n}: {v} comes back as {back}");
             }
             let other = (n + spread_over_sphere((7 * i + 3) % 500, 500) * 0.02).normalize();
             if side_of(other) == side {
-                let apart = Axes::about(other, side).to_world(Vec3::X).distance(axes.to_world(Vec3::X));
+                let apart = to_world(&Axes::about(other, side), Vec3::X).distance(to_world(&axes, Vec3::X));
                 assert!(apart < 0.06, "{n} and {other}: {apart}");
             }
         }
+    }
+
+    fn guided<'a>(guide: &'a Guide, from: &Receiver, surface: &Surface, at: &At) -> Option<Guided<'a>> {
+        Guided::new(&guide.at(from)?, from, &surface.frame, at)
     }
 
     /// The square of the radius at which two numbers lie on the disk.
@@ -306,13 +333,13 @@ mod tests {
         let surface = Surface::flat(from.p, from.n);
         let white = Bsdf::Diffuse(crate::material::bsdf::Diffuse { reflectance: Texture::Constant(Rgb::ONE) });
         let at = white.at(&surface, Vec3::Z, Query::default());
-        let guided = guide.at(&from, &at).expect("it has seen much");
+        let guided = guided(&guide, &from, &surface, &at).expect("it has seen much");
         let share = |guided: Option<&Guided>| {
             let towards = |k: &u32| {
                 let [x, y] = Sampler::new(1, *k).next_2d().to_array();
                 let v = Vec2::new(x, y);
                 let sample = match guided {
-                    Some(guided) => guided.sample(&at, &surface.frame, 0.5, v),
+                    Some(guided) => guided.sample(&at, 0.5, v),
                     None => at.sample(0.5, v),
                 };
                 surface.frame.to_world(sample.unwrap().wo).dot(sun) > 0.95
@@ -325,9 +352,9 @@ mod tests {
         // Elsewhere nothing is known, nor for the back, nor for what scatters to both sides.
         for other in [Receiver { p: -from.p * 5.0, ..from }, Receiver { n: -from.n, ..from }, Receiver { n: Vec3::ZERO, ..from }]
         {
-            assert!(guide.at(&other, &at).is_none());
+            assert!(guide.at(&other).is_none());
         }
-        assert!(lit_from(sun, &from, 63).guide().at(&from, &at).is_none(), "too few");
+        assert!(lit_from(sun, &from, 63).guide().at(&from).is_none(), "too few");
     }
 
     /// Models with a diffuse lobe.
@@ -355,7 +382,7 @@ mod tests {
         let wi = Vec3::new(0.3, -0.5, 0.8).normalize();
         for bsdf in models() {
             let at = bsdf.at(&surface, wi, Query::default());
-            let guided = guide.at(&from, &at).unwrap();
+            let guided = guided(&guide, &from, &surface, &at).unwrap();
             // The integral of the model times something uneven: guided, as ever, and by directions that are drawn evenly.
             let uneven = |wo: Vec3| if wo.x > 0.2 { 3.0 } else { 1.0 };
             let mean = |draw: &dyn Fn(f32, Vec2) -> Option<BsdfSample>| {
@@ -365,19 +392,19 @@ mod tests {
                 };
                 (0..1 << 14).map(of).sum::<f64>() / f64::from(1 << 14)
             };
-            let [a, b] = [mean(&|u, v| guided.sample(&at, &surface.frame, u, v)), mean(&|u, v| at.sample(u, v))];
+            let [a, b] = [mean(&|u, v| guided.sample(&at, u, v)), mean(&|u, v| at.sample(u, v))];
             assert!((a / b - 1.0).abs() < 0.01, "{bsdf:?}: {a}, {b} without a guide");
             let mut total = 0.0;
             for k in 0..1 << 14 {
                 let wo = cosine_hemisphere(Sampler::new(6, k).next_2d());
                 let pdf = at.eval_pdf(wo).1;
-                total += guided.pdf(pdf, &surface.frame, wo) / (wo.z * FRAC_1_PI) - pdf / (wo.z * FRAC_1_PI);
+                total += guided.pdf(pdf, wo) / (wo.z * FRAC_1_PI) - pdf / (wo.z * FRAC_1_PI);
                 let [x, y, lobe, _] = Sampler::new(5, k).next_4d();
-                let Some(s) = guided.sample(&at, &surface.frame, lobe, Vec2::new(x, y)).filter(|s| !s.delta) else { continue };
+                let Some(s) = guided.sample(&at, lobe, Vec2::new(x, y)).filter(|s| !s.delta) else { continue };
                 let (value, pdf) = at.eval_pdf(s.wo);
-                let pdf = guided.pdf(pdf, &surface.frame, s.wo);
+                let pdf = guided.pdf(pdf, s.wo);
                 // Next to the border of two parts it may be the other one's.
-                let near = (pdf / s.pdf - 1.0).abs() < 1e-3 || beside(&guided, surface.frame.to_world(s.wo));
+                let near = (pdf / s.pdf - 1.0).abs() < 1e-3 || beside(&guided, s.wo);
                 assert!(
                     near && (s.weight * s.pdf - value).abs().max_element() < 1e-3 * value.max_element().max(1.0),
                     "{bsdf:?}: {pdf} {s:?}"
@@ -389,8 +416,8 @@ mod tests {
     }
 
     /// Whether a direction is next to the border of two parts.
-    fn beside(guided: &Guided, d: Vec3) -> bool {
-        let v = guided.axes.numbers(d) * SIDE as f32;
+    fn beside(guided: &Guided, wo: Vec3) -> bool {
+        let v = square(guided.turn * wo.xy()) * SIDE as f32;
         (v - v.round()).abs().min_element() < 1e-3
     }
 

@@ -1,7 +1,7 @@
 //! A point of a path where light arrives: what it makes of light straight from emitters, and where a path may go on.
 
 use super::World;
-use super::guide::{Guide, Guided};
+use super::guide::{Guided, Known};
 use super::light_sample::LightSample;
 use super::light_tree::Receiver;
 use super::met::power_heuristic;
@@ -49,9 +49,9 @@ impl<'a> Vertex<'a> {
 
     /// From now on draws directions as a guide has it.
     #[inline]
-    pub(super) fn follow(&mut self, guide: &'a Guide, from: &Receiver) {
+    pub(super) fn follow(&mut self, known: &Known<'a>, from: &Receiver) {
         if let Measure::Scattering(at) = &self.measure {
-            self.guided = guide.at(from, at);
+            self.guided = Guided::new(known, from, &self.surface.frame, at);
         }
     }
 
@@ -110,7 +110,7 @@ impl<'a> Vertex<'a> {
             Measure::Scattering(at) => {
                 let (value, pdf) = at.eval_pdf(wo);
                 match &self.guided {
-                    Some(guided) if value != Rgb::ZERO => (value, guided.pdf(pdf, &self.surface.frame, wo)),
+                    Some(guided) if value != Rgb::ZERO => (value, guided.pdf(pdf, wo)),
                     _ => (value, pdf),
                 }
             }
@@ -127,7 +127,7 @@ impl<'a> Vertex<'a> {
         match &self.measure {
             Measure::Scattering(at) => {
                 let sample = match &self.guided {
-                    Some(guided) => guided.sample(at, &self.surface.frame, u, v),
+                    Some(guided) => guided.sample(at, u, v),
                     None => at.sample(u, v),
                 };
                 sample.filter(|s| s.weight != Rgb::ZERO)

@@ -102,13 +102,14 @@ impl Walk<'_> {
             return sum;
         }
         let from = receiver(self.world, s, wo);
+        let known = self.plan.and_then(|plan| plan.guide.at(&from));
         let light = |[x, y, choice, _]: [f32; 4]| self.world.light(&from, choice, Vec2::new(x, y));
         // Before the textures are read, which have been asked for only now.
         let first = if emitters > 0 { light(emitter) } else { None };
         let in_mirrors = self.params.max_depth - start.depth > 1;
         let mut vertex = Vertex::scattering(self.world, s, wo, query);
-        if let Some(plan) = self.plan {
-            vertex.follow(&plan.guide, &from);
+        if let Some(known) = &known {
+            vertex.follow(known, &from);
         }
         let share = Rgb::splat(1.0 / direct);
         for k in 0..emitters {
